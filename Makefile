@@ -1,0 +1,48 @@
+# Everything runs from .venv, made from requirements.lock (exact versions with hashes, wheels only).
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/installed
+# mypy and import-linter do not follow the editable finder; they do follow a folder of links.
+LINKS := $(VENV)/links
+
+.PHONY: compare test check format lint types layers tests lock clean
+
+compare: $(STAMP)
+	$(BIN)/impactbench compare --out out $(ARGS)
+
+# What CI needs: every check and the tests.
+test: check
+
+check: format lint types layers tests
+
+format: $(STAMP)
+	$(BIN)/ruff format --check .
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+
+types: $(STAMP)
+	MYPYPATH=$(LINKS) $(BIN)/mypy $(LINKS)/impactbench
+
+layers: $(STAMP)
+	PYTHONPATH=$(LINKS) $(BIN)/lint-imports --no-cache
+
+tests: $(STAMP)
+	$(BIN)/pytest $(ARGS)
+
+$(STAMP): requirements.lock pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	mkdir -p $(LINKS)/impactbench
+	for part in scenarios reference adapters reports; do ln -sfn ../../../$$part $(LINKS)/impactbench/$$part; done
+	touch $@
+
+# New versions: needs uv (pip install uv).
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate \
+	  --only-binary :all: --group dev --output-file requirements.lock pyproject.toml
+
+clean:
+	rm -rf $(VENV) build *.egg-info

@@ -1,0 +1,1 @@
+"""Records, catalogue and truths. Imports numpy and the standard library only."""
