@@ -1,19 +1,22 @@
 """What a scene is: bodies, shapes, coefficients of pairs and the smallest model that can show the effect.
 
-Records are plain immutable data in SI units (m, kg, s, rad). They know nothing of engines. Vectors are tuples of three floats, so that
+Records are plain immutable data in SI units (m, kg, s, rad). They know nothing of engines.
+Vectors are tuples of three floats, so that
 scenes compare, hash and serialise exactly; engines turn them into arrays once.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Law = Literal["doc", "nc"]
-"""`doc`: the documents' law (R5 viscous friction, R9 impacts). `nc`: Newton restitution e on the normal, Coulomb friction mu."""
+"""`doc`: the documents' law (R5 viscous friction, R9 impacts). `nc`: Newton restitution e on the normal, Coulomb
+friction mu."""
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -43,7 +46,8 @@ class Capsule:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Everything behind the plane through the body's position: points x with (x - position) . normal <= 0. Static only."""
+    """Everything behind the plane through the body's position: points x with (x - position) . normal <= 0.
+    Static only."""
 
     normal: Vector
 
@@ -57,7 +61,8 @@ class Body:
 
     position [m] of the centre of mass (a point of the plane, for a half-space), velocity [m/s], orientation as a unit
     quaternion (w, x, y, z), spin [rad/s] in world axes. A static body (R1) has `mass` None and never moves.
-    `inertia` [kg m^2] holds the principal moments along the body's own axes; None means the shape's own, uniform density.
+    `inertia` [kg m^2] holds the principal moments along the body's own axes;
+    None means the shape's own, uniform density.
     """
 
     name: str
@@ -141,10 +146,12 @@ class Scene:
     """A case: bodies, gravity, coefficients and duration, with the smallest model that can show the effect.
 
     name: `family[parameter=value,...]`, unique in the catalogue.
-    laws: the laws the scene has a meaning under. A scene with viscous friction is `doc` only, one with Coulomb friction `nc` only.
+    laws: the laws the scene has a meaning under. A scene with viscous friction is `doc` only, one with Coulomb friction
+    `nc` only.
     contact: coefficients of every pair not listed in `pairs`; `pairs` maps two body names to their own coefficients.
     length, speed, energy: scales [m], [m/s], [J] that make errors dimensionless.
-    phase_free: the bodies fly freely at t = 0, so that the start may be shifted by a fraction of a step (see `shifted`).
+    phase_free: the bodies fly freely at t = 0, so that the start may be shifted by a fraction of a step (see
+    `shifted`).
     """
 
     name: str
@@ -202,6 +209,6 @@ def shifted(scene: Scene, delay: float) -> Scene:
     return replace(scene, bodies=tuple(earlier(body) for body in scene.bodies))
 
 
-def _vector(values: object) -> Vector:
-    x, y, z = values  # type: ignore[misc, attr-defined]
+def _vector(values: Iterable[float]) -> Vector:
+    x, y, z = values
     return (float(x), float(y), float(z))

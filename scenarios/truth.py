@@ -16,7 +16,8 @@ Kind = Literal["trajectory", "end state", "invariant"]
 class Truth:
     """What must come out, from a closed form and never from a contestant.
 
-    kind:         `trajectory` (state at every time), `end state` (state once settled) or `invariant` (no state: conservation only).
+    kind:         `trajectory` (state at every time), `end state` (state once settled) or `invariant` (no state:
+    conservation only).
     state:        time [s] -> the movable bodies' state, or None at times where nothing is known.
     impact_times: instants [s] of the impacts, ascending, as far as known; may be empty.
     """
@@ -37,7 +38,8 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A function of parameters. `cases` builds the default cases; `question` and `needs` are for the reader of a list."""
+    """A function of parameters. `cases` builds the default cases; `question` and `needs` are for the reader of a
+    list."""
 
     name: str
     question: str
