@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
 from impactbench.scenarios.laws import impact
 from impactbench.scenarios.naming import Parameters, case_name
 from impactbench.scenarios.pieces import motion, opening
@@ -85,8 +84,8 @@ def unfolding_times(start: Floats, velocity: Floats, room: Floats, duration: flo
         if v != 0:
             ends = sorted((x, x + v * duration))
             walls = range(math.ceil(ends[0] / length), math.floor(ends[1] / length) + 1)
-            times |= {round(float((k * length - x) / v), 12) for k in walls}  # rounded:
-            both parts of a corner hit agree
+            # Rounded, so that both parts of a corner hit agree.
+            times |= {round(float((k * length - x) / v), 12) for k in walls}
     return tuple(sorted(t for t in times if 0 < t <= duration))
 
 
@@ -128,7 +127,7 @@ def box_of_walls(dimension: int, hit: str = "faces") -> Case:
         return State(folded.positions - inner / 2, folded.velocities)
 
     truth = Truth("trajectory", state, unfolding_times(inner / 2, velocity, inner, duration))
-    return Case(scene, {law: truth for law in scene.laws})
+    return Case(scene, dict.fromkeys(scene.laws, truth))
 
 
 FAMILIES = (
