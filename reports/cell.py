@@ -1,0 +1,194 @@
+"""One cell: a case run by one contestant at one step. Runs inside a child process; what it returns is plain data."""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from impactbench.adapters.contestants import Contestant
+from impactbench.reports.measures import Figure, measure
+from impactbench.scenarios import catalogue
+from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
+from impactbench.scenarios.records import FULL, Law, Scene, shifted
+from impactbench.scenarios.trajectory import State, Trajectory
+from impactbench.scenarios.truth import Case
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What identifies a cell. `step` is text such as 1/240, so that it names the same number everywhere; `phase` is in steps."""
+
+    case: str
+    law: Law
+    contestant: str
+    model: str
+    step: str
+    phase: float = 0.0
+
+    @property
+    def step_seconds(self) -> float:
+        return step_seconds(self.step)
+
+    @property
+    def key(self) -> str:
+        return f"{self.case} {self.law} {self.contestant} {self.model} {self.step} {self.phase:g}"
+
+
+def step_seconds(text: str) -> float:
+    """Seconds of `1/240` or `0.004`. Raises ValueError with what is possible instead."""
+    try:
+        seconds = float(Fraction(text))
+    except (ValueError, ZeroDivisionError):
+        seconds = math.nan
+    if not (math.isfinite(seconds) and 0 < seconds <= 1):
+        raise ValueError(f"step {text!r} is not a number of seconds above 0 and up to 1; write it as 1/240 or 0.004")
+    return seconds
+
+
+@cache
+def case_named(name: str) -> Case:
+    (case,) = catalogue.select([name])
+    return case
+
+
+def step_count(scene: Scene, step: float) -> int:
+    """Steps that reach the scene's end: as many as fit, to half a round-off of their number."""
+    return max(1, round(scene.duration / step))
+
+
+def build(cell: Cell, contestant: Contestant) -> Engine:
+    """The contestant's world for this cell. Raises Unsupported or Unavailable with a reason."""
+    scene = case_named(cell.case).scene
+    if cell.phase:
+        scene = shifted(scene, cell.phase * cell.step_seconds)
+    model = scene.model if cell.model == "minimal" else FULL
+    engine: Engine = contestant.load()(scene, cell.law, contestant.profile, model, cell.step_seconds)
+    return engine
+
+
+def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
+    """State, reason, settings and figures of one cell, recorded at every step."""
+    cell, contestant = argument
+    try:
+        engine = build(cell, contestant)
+    except Unsupported as why:
+        return {"state": "unsupported", "reason": str(why)}
+    except Unavailable as why:
+        return {"state": "unavailable", "reason": str(why)}
+    try:
+        case = case_named(cell.case)
+        trajectory = record(engine, cell.step_seconds, step_count(case.scene, cell.step_seconds))
+        settings = {name: _plain(value) for name, value in engine.settings.items()}
+    finally:
+        engine.close()
+    if not trajectory.finite():
+        return {"state": "diverged", "reason": _first_divergence(trajectory), "settings": settings}
+    # A state that is finite yet absurd overflows in the measures: that run has diverged too.
+    with np.errstate(over="ignore", invalid="ignore"):
+        figures = measure(case, cell.law, trajectory, cell.phase * cell.step_seconds)
+    if not all(math.isfinite(figure.value) for figure in figures):
+        bad = next(figure.measure for figure in figures if not math.isfinite(figure.value))
+        return {"state": "diverged", "reason": f"{bad} is not finite", "settings": settings}
+    return {"state": "ok", "reason": "", "settings": settings, "figures": figures}
+
+
+def record(engine: Engine, step: float, count: int) -> Trajectory:
+    """The state at every step, so that no maximum is missed between samples."""
+    states = [engine.read()]
+    for _ in range(count):
+        engine.advance(1)
+        states.append(engine.read())
+    return stack(step * np.arange(count + 1), states)
+
+
+def stack(times: np.ndarray[tuple[int], np.dtype[np.float64]], states: Sequence[State]) -> Trajectory:
+    first = states[0]
+    turning = first.spins is not None and first.orientations is not None
+    return Trajectory(
+        times,
+        np.array([state.positions for state in states]),
+        np.array([state.velocities for state in states]),
+        np.array([state.orientations for state in states]) if turning else None,
+        np.array([state.spins for state in states]) if turning else None,
+    )
+
+
+def _first_divergence(trajectory: Trajectory) -> str:
+    fine = np.isfinite(trajectory.positions).all(axis=2) & np.isfinite(trajectory.velocities).all(axis=2)
+    if fine.all():
+        return "orientation or spin is not finite"
+    step, row = np.argwhere(~fine)[0]
+    return f"body {row} is not finite at t = {trajectory.times[step]:.6g} s"
+
+
+def _plain(value: object) -> object:
+    """A setting as JSON can hold it."""
+    return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
+
+
+def time_cells(argument: tuple[Sequence[tuple[Cell, Contestant]], int]) -> dict[str, list[float]]:
+    """Wall seconds per simulated second of each cell, one number a round; cells take turns, in alternating order, after a warm-up round.
+
+    Building is outside the clock; nothing is read inside it. A run whose final state is not finite has no speed and is left out.
+    """
+    cells, rounds = argument
+    times: dict[str, list[float]] = {cell.key: [] for cell, _ in cells}
+    for turn in range(rounds + 1):
+        for cell, contestant in cells if turn % 2 else reversed(cells):
+            seconds = _time_once(cell, contestant)
+            if turn and seconds is not None:
+                times[cell.key].append(seconds)
+    return {key: seconds for key, seconds in times.items() if len(seconds) == rounds}
+
+
+def _time_once(cell: Cell, contestant: Contestant) -> float | None:
+    engine = build(cell, contestant)
+    step = cell.step_seconds
+    count = step_count(case_named(cell.case).scene, step)
+    gc.disable()
+    try:
+        start = time.perf_counter()
+        engine.advance(count)
+        elapsed = time.perf_counter() - start
+        final = engine.read()
+    finally:
+        gc.enable()
+        engine.close()
+    valid = bool(np.isfinite(final.positions).all() and np.isfinite(final.velocities).all())
+    return elapsed / (count * step) if valid else None
+
+
+def timing_figures(seconds: Sequence[float]) -> list[Figure]:
+    """Minimum, median and the interval that holds the true median with at least 95 % (order statistics, binomial)."""
+    ordered = sorted(seconds)
+    low, high = median_ranks(len(ordered))
+    return [
+        Figure("wall_time", float(np.median(ordered))),
+        Figure("wall_time_min", ordered[0]),
+        Figure("wall_time_low", ordered[low]),
+        Figure("wall_time_high", ordered[high]),
+        Figure("wall_repeats", float(len(ordered))),
+    ]
+
+
+def median_ranks(count: int) -> tuple[int, int]:
+    """Ranks (from 0) of the narrowest symmetric pair of order statistics that brackets the median with probability >= 0.95.
+
+    P(the median is below the k-th smallest) = sum over i < k of C(n, i) / 2^n. With fewer than 6 values no pair does: the extremes.
+    """
+    outside, low = 0.0, 0
+    while low < count // 2:
+        outside += math.comb(count, low) / 2**count
+        if 2 * outside > 0.05:
+            break
+        low += 1
+    low = max(low - 1, 0)
+    return low, count - 1 - low

@@ -1,0 +1,207 @@
+"""The command line. Heavy packages are imported only by the command that needs them, so that help answers at once."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from impactbench.adapters.contestants import Contestant
+    from impactbench.reports.compare import Progress
+    from impactbench.scenarios.records import Law
+
+NOTHING_MEASURED = 3
+ENGINE_HELP = "An engine (mujoco), a contestant (mujoco/tuned), a glob, or FILE.py:Class for your own. Repeatable."
+
+
+class _Plain(click.Group):
+    """Any mistake of the user's is one line on stderr and exit code 2."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().main(*args, **{**kwargs, "standalone_mode": False})
+        except click.exceptions.Exit as done:
+            sys.exit(done.exit_code)
+        except (click.exceptions.Abort, KeyboardInterrupt):
+            click.echo("impactbench: interrupted", err=True)
+            sys.exit(130)
+        except click.ClickException as error:
+            click.echo(f"impactbench: {' '.join(error.format_message().split())}", err=True)
+            sys.exit(2)
+
+
+@click.group(cls=_Plain, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="impactbench")
+def main() -> None:
+    """Compare rigid-body engines on contact scenes with known truth: momentum, energy, penetration, speed against error."""
+
+
+def _steps(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
+    from impactbench.reports.cell import step_seconds
+
+    for text in texts:
+        try:
+            step_seconds(text)
+        except ValueError as error:
+            raise click.BadParameter(str(error)) from None
+    return tuple(dict.fromkeys(texts))
+
+
+def _contestants(engines: Sequence[str], profile: str) -> list[Contestant]:
+    from impactbench.adapters import contestants
+
+    try:
+        return contestants.select(engines, None if profile == "both" else profile)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _cases(names: Sequence[str]) -> list[Any]:
+    from impactbench.scenarios import catalogue
+
+    try:
+        return catalogue.select(names)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+
+
+def _folder(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / f".probe-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise click.UsageError(f"cannot write to {path}: {error.strerror}; choose another folder with --out") from None
+    return path
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A bar with the remaining time on stderr; nothing where stderr is not a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        tasks: dict[str, Any] = {}
+
+        def show(lane: str, done: int, total: int) -> None:
+            task = tasks.setdefault(lane, None) or bar.add_task(lane, total=total)
+            tasks[lane] = task
+            bar.update(task, completed=done)
+
+        yield show
+
+
+@main.command()
+@click.argument("cases", nargs=-1, metavar="[CASE ...]")
+@click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
+@click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
+@click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
+@click.option("--step", "steps", multiple=True, callback=_steps, help="Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960.")
+@click.option("--model", type=click.Choice(["minimal", "full", "both"]), default="minimal", show_default=True)
+@click.option("--timing", type=click.Choice(["some", "all", "none"]), default="some", show_default=True, help="Which cases to time.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
+@click.option("--jobs", type=click.IntRange(1, 256), default=lambda: os.cpu_count() or 1, help="Cells run at once. Default: cores.")
+def compare(
+    cases: tuple[str, ...],
+    engines: tuple[str, ...],
+    profile: str,
+    law: Law | None,
+    steps: tuple[str, ...],
+    model: str,
+    timing: str,
+    out: Path,
+    jobs: int,
+) -> None:
+    """Run scenarios on all contestants and write OUT/results.json and OUT/report.html.
+
+    CASE is a family (equal_masses), a case (equal_masses[bounciness=0.5]) or a glob; none means all. Exit code 3: nothing was measured.
+    """
+    chosen, contestants, folder = _cases(cases), _contestants(engines, profile), _folder(out)
+
+    from impactbench.reports.compare import LADDER, Plan
+    from impactbench.reports.compare import compare as run_comparison
+
+    models = ("minimal", "full") if model == "both" else (model,)
+    plan = Plan(chosen, contestants, steps or LADDER, law, models, jobs=jobs, timing=timing)
+    with _progress() as progress:
+        document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
+    _write(document, folder)
+    from impactbench.reports.terminal import summary
+
+    click.echo(summary(document))
+    click.echo(f"report: {folder / 'report.html'}")
+    if not any(cell["state"] == "ok" for cell in document["cells"]):
+        sys.exit(NOTHING_MEASURED)
+
+
+def _write(document: dict[str, Any], folder: Path) -> None:
+    from impactbench.reports import page, results
+
+    try:
+        results.save(document, folder / "results.json")
+        page.write_page(document, folder / "report.html")
+    except OSError as error:
+        raise click.UsageError(f"cannot write to {folder}: {error.strerror}; earlier files there are untouched") from None
+
+
+@main.command()
+@click.argument("case")
+@click.option("--engine", required=True, help="One contestant: mujoco (with --profile), mujoco/tuned or FILE.py:Class.")
+@click.option("--step", "steps", required=True, multiple=True, callback=_steps, help="Step [s], 1/240 or 0.004.")
+@click.option("--profile", type=click.Choice(["default", "tuned"]), default="tuned", show_default=True)
+@click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
+@click.option("--model", type=click.Choice(["minimal", "full"]), default="minimal", show_default=True)
+@click.option("--phase", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="Start this part of a step earlier.")
+@click.option("--json", "as_json", is_flag=True, help="Print the cell as JSON.")
+def run(
+    case: str, engine: str, steps: tuple[str, ...], profile: str, law: Law | None, model: str, phase: float, as_json: bool
+) -> None:
+    """Run one cell and print all its measures. Exit code 3: it could not be measured."""
+    chosen, contestants = _cases([case]), _contestants([engine], profile)
+    if len(chosen) != 1 or len(contestants) != 1 or len(steps) != 1:
+        names = ", ".join(c.scene.name for c in chosen[:4]) if len(chosen) != 1 else ", ".join(c.name for c in contestants[:4])
+        raise click.UsageError(f"run takes one case, one contestant and one step; got {len(chosen)}, {len(contestants)}, {len(steps)} ({names}, ...)")
+    if phase and not chosen[0].scene.phase_free:
+        raise click.UsageError(f"{chosen[0].scene.name}: bodies touch at t = 0, so that --phase must be 0")
+
+    from impactbench.reports.compare import Plan
+    from impactbench.reports.compare import compare as run_comparison
+    from impactbench.reports.terminal import cell_table
+
+    plan = Plan(chosen, contestants, steps, law, (model,), (phase,), timing="all")
+    document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]))
+    if as_json:
+        import json
+
+        click.echo(json.dumps(document, indent=1, allow_nan=False))
+    else:
+        click.echo(cell_table(document))
+    if document["cells"][0]["state"] != "ok":
+        sys.exit(NOTHING_MEASURED)
+
+
+@main.command("list")
+@click.argument("what", type=click.Choice(["scenarios", "engines", "all"]), default="all")
+def list_(what: str) -> None:
+    """List scenarios and engines, with what is available here."""
+    from impactbench.reports import terminal
+
+    parts: dict[str, Callable[[], str]] = {"scenarios": terminal.scenario_table, "engines": terminal.engine_table}
+    click.echo("\n".join(parts[name]() for name in parts if what in (name, "all")))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,218 @@
+"""The comparison: plan the cells, run them in child processes, time them, gather one results document."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from impactbench.adapters.contestants import Contestant
+from impactbench.adapters.isolation import Job, Outcome, run_jobs
+from impactbench.reports import results
+from impactbench.reports.cell import Cell, step_seconds, timing_figures
+from impactbench.reports.measures import Figure, law_difference
+from impactbench.scenarios.catalogue import FAMILIES
+from impactbench.scenarios.records import Law
+from impactbench.scenarios.truth import Case
+
+LADDER = ("1/30", "1/60", "1/120", "1/240", "1/480", "1/960")
+ROUNDS = 10
+CELL_LIMIT = 60.0
+"""Seconds one cell may take: a hundred times the slowest healthy one of the default set."""
+TIMED_FAMILIES = ("free_flight", "equal_masses", "box_of_walls", "bouncing_ball", "stacked_drop", "coulomb_slide")
+"""The timing lane runs one case of each by default: free flight, one impact, many one-way impacts, gravity, resting contact, friction."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run. `law` is for the contestants that can choose theirs; `phases` in steps."""
+
+    cases: Sequence[Case]
+    contestants: Sequence[Contestant]
+    steps: Sequence[str] = LADDER
+    law: Law | None = None
+    models: Sequence[str] = ("minimal",)
+    phases: Sequence[float] = (0.0,)
+    jobs: int = 1
+    timing: str = "some"
+
+    def cells(self) -> list[tuple[Cell, Contestant]]:
+        """In an order that keeps an engine's cells together."""
+        return [
+            (Cell(case.scene.name, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
+            for contestant in self.contestants
+            for case in self.cases
+            for model in self.models
+            for phase in (self.phases if case.scene.phase_free else (0.0,))
+            for step in self.steps
+        ]
+
+
+def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:
+    """Engines realise Newton-Coulomb; the reference runs the law asked for, the documents' by default. A scene of one law has no choice."""
+    laws = case.scene.laws
+    wanted = asked if asked and contestant.chooses_law else contestant.law
+    return wanted if wanted in laws else laws[0]
+
+
+def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> dict[str, Any]:
+    """Run the plan and return the results document. One cell's fault costs that cell alone."""
+    cells = plan.cells()
+    load = os.getloadavg()[0]
+    document = {
+        "schema": results.SCHEMA,
+        "provenance": provenance(command, plan.contestants, load),
+        "cases": [describe(case) for case in plan.cases],
+        "cells": [],
+        "rows": [],
+        "law_difference": [
+            {"case": case.scene.name} | asdict(figure) | {"unit": figure.unit} for case in plan.cases for figure in law_difference(case)
+        ],
+    }
+    outcomes = accuracy_lane(cells, plan.jobs, progress)
+    timings = timing_lane(_timed(plan, cells, outcomes), progress) if plan.timing != "none" else {}
+    for cell, contestant in cells:
+        outcome = outcomes[cell.key]
+        document["cells"].append(_cell_record(cell, contestant, outcome))
+        figures: list[Figure] = outcome.get("figures", [])
+        figures = [*figures, *(timing_figures(timings[cell.key]) if timings.get(cell.key) else [])]
+        index = len(document["cells"]) - 1
+        document["rows"] += [{"cell": index, "measure": f.measure, "value": f.value, "unit": f.unit} for f in figures]
+    return document
+
+
+def accuracy_lane(cells: Sequence[tuple[Cell, Contestant]], jobs: int, progress: Progress) -> dict[str, dict[str, Any]]:
+    """Every cell once, in parallel; deterministic whatever the number of workers."""
+    outcomes: dict[str, dict[str, Any]] = {}
+    missing = {contestant.name: why for _, contestant in cells if (why := contestant.availability())}
+    for cell, contestant in cells:
+        if contestant.name in missing:
+            outcomes[cell.key] = {"state": "unavailable", "reason": missing[contestant.name]}
+    work = [
+        Job(cell.key, contestant.engine, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
+        for cell, contestant in cells
+        if contestant.name not in missing
+    ]
+    for done, outcome in enumerate(run_jobs(work, jobs), 1):
+        outcomes[outcome.key] = _as_cell(outcome)
+        progress("accuracy", done, len(work))
+    return outcomes
+
+
+def _as_cell(outcome: Outcome) -> dict[str, Any]:
+    if outcome.state == "done":
+        assert isinstance(outcome.value, dict)
+        return outcome.value
+    return {"state": outcome.state, "reason": outcome.reason}
+
+
+def _timed(plan: Plan, cells: Sequence[tuple[Cell, Contestant]], outcomes: dict[str, dict[str, Any]]) -> list[list[tuple[Cell, Contestant]]]:
+    """Groups of cells to be timed against one another: one group a case, healthy cells of the first phase only."""
+    first: dict[str, str] = {}
+    for case in plan.cases:
+        first.setdefault(case.scene.family, case.scene.name)
+    names = (
+        {case.scene.name for case in plan.cases}
+        if plan.timing == "all"
+        else {name for family, name in first.items() if family in TIMED_FAMILIES or len(first) <= len(TIMED_FAMILIES)}
+    )
+    groups: dict[str, list[tuple[Cell, Contestant]]] = {}
+    for cell, contestant in cells:
+        if cell.case in names and cell.phase == plan.phases[0] and outcomes[cell.key]["state"] == "ok":
+            groups.setdefault(cell.case, []).append((cell, contestant))
+    return list(groups.values())
+
+
+def timing_lane(groups: Sequence[list[tuple[Cell, Contestant]]], progress: Progress) -> dict[str, list[float]]:
+    """One process, one thread, one case after another; a group that fails has no times, and its accuracy stands."""
+    limit = CELL_LIMIT * ROUNDS
+    work = [
+        Job(group[0][0].case, "timing", "impactbench.reports.cell:time_cells", (group, ROUNDS), limit) for group in groups
+    ]
+    times: dict[str, list[float]] = {}
+    for done, outcome in enumerate(run_jobs(work, 1), 1):
+        if outcome.state == "done":
+            assert isinstance(outcome.value, dict)
+            times |= outcome.value
+        progress("timing", done, len(work))
+    return times
+
+
+def _cell_record(cell: Cell, contestant: Contestant, outcome: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "case": cell.case,
+        "family": cell.case.partition("[")[0],
+        "law": cell.law,
+        "contestant": cell.contestant,
+        "model": cell.model,
+        "step": step_seconds(cell.step),
+        "step_text": cell.step,
+        "phase": cell.phase,
+        "state": outcome["state"],
+        "reason": outcome["reason"],
+        "version": contestant.version(),
+        "settings": outcome.get("settings", {}),
+    }
+
+
+def describe(case: Case) -> dict[str, Any]:
+    """What a reader of the report needs to know of a case."""
+    scene = case.scene
+    family = FAMILIES.get(scene.family)
+    return {
+        "name": scene.name,
+        "family": scene.family,
+        "question": family.question if family else "",
+        "headline": case.headline,
+        "laws": list(scene.laws),
+        "truth": {law: truth.kind for law, truth in case.truths.items()},
+        "duration": scene.duration,
+        "length": scene.length,
+        "speed": scene.speed,
+        "energy": scene.energy,
+        "parameters": scene.parameters,
+        "model": asdict(scene.model),
+    }
+
+
+def provenance(command: str, contestants: Iterable[Contestant], load: float) -> dict[str, Any]:
+    """Where and with what the figures were made. Everything is deterministic: there are no seeds to store."""
+    busy = load > 0.5
+    return {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": command,
+        "impactbench": metadata.version("impactbench"),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "cores": os.cpu_count() or 1,
+        "commit": _commit(),
+        "versions": {contestant.engine: contestant.version() for contestant in contestants} | {"numpy": metadata.version("numpy")},
+        "load": load,
+        "notes": [f"the machine was busy when this began (load {load:.1f}): times may be too long"] if busy else [],
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def _commit() -> str | None:
+    """Commit of the checkout this runs from; None for an installed package."""
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short=12", "HEAD"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return None

@@ -1,0 +1,144 @@
+"""Momentum, angular momentum and energy of a trajectory: what is known to be conserved, and by how much it is not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from impactbench.reports.geometry import rotation_matrices
+from impactbench.reports.impacts import Impact, PairHistory
+from impactbench.scenarios.records import Law, Scene
+from impactbench.scenarios.trajectory import Floats, Trajectory
+
+
+def masses(scene: Scene) -> Floats:
+    """Masses of the movable bodies [kg], shape [n]."""
+    return np.array([scene.bodies[index].mass for index in scene.movable], dtype=np.float64)
+
+
+def momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, pairs: list[PairHistory]) -> float:
+    """Largest norm of the momentum that no contact could have given, relative to the largest sum of m |v|.
+
+    Without statics that is P - P0 - M g t. A static gives impulses along its normal while it is touched, and, with Coulomb friction, up to
+    mu times that along its plane; under the documents' law an impact with b < 1 or viscous friction may act in any direction (R8, R9).
+    """
+    mass = masses(scene)
+    momenta = np.einsum("n,tni->ti", mass, trajectory.velocities)
+    scale = max(
+        float(np.einsum("n,tn->t", mass, np.linalg.norm(trajectory.velocities, axis=2)).max()), float(mass.max()) * scene.speed
+    )
+    steps = np.diff(trajectory.times)
+    excess = np.diff(momenta, axis=0) - mass.sum() * np.outer(steps, scene.gravity)
+    with_statics = [pair for pair in pairs if scene.bodies[pair.a].static]
+    if with_statics:
+        excess = _outside_contacts(scene, law, excess, steps, with_statics)
+    drift = np.linalg.norm(np.cumsum(excess, axis=0), axis=1)
+    return float(drift.max(initial=0.0)) / scale
+
+
+def _outside_contacts(scene: Scene, law: Law, excess: Floats, steps: Floats, pairs: list[PairHistory]) -> Floats:
+    speeds = [np.linalg.norm(pair.relative, axis=1) for pair in pairs]
+    touched = np.array(
+        [
+            np.minimum(pair.gap[:-1], pair.gap[1:]) <= 2 * np.maximum(v[:-1], v[1:]) * steps + 1e-3 * scene.length
+            for pair, v in zip(pairs, speeds, strict=True)
+        ]
+    )
+    left = excess.copy()
+    for k in np.flatnonzero(touched.any(axis=0)):
+        contacts = [pair for pair, near in zip(pairs, touched[:, k], strict=True) if near]
+        left[k] = _impossible_part(scene, law, excess[k], contacts, int(k))
+    return left
+
+
+def _impossible_part(scene: Scene, law: Law, impulse: Floats, contacts: list[PairHistory], k: int) -> Floats:
+    coefficients = [scene.contact_of(pair.a, pair.b) for pair in contacts]
+    if law == "doc" and any(c.bounciness < 1 or c.viscosity > 0 for c in coefficients):
+        return np.zeros(3)
+    normals = np.array([pair.normal[k] for pair in contacts]).T
+    along = normals @ np.linalg.lstsq(normals, impulse, rcond=None)[0]
+    beyond = impulse - along
+    size = float(np.linalg.norm(beyond))
+    allowed = max(c.friction for c in coefficients) * float(np.linalg.norm(along)) if law == "nc" else 0.0
+    return np.zeros(3) if size <= allowed else np.asarray(beyond * (1 - allowed / size))
+
+
+def angular_momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, impacts: list[Impact]) -> float | None:
+    """Largest change of the angular momentum about the common centre of mass, relative to the largest sum of m |r| |v| (and spin).
+
+    None where the law does not conserve it: with statics, or with friction between bodies whose rotation is not modelled. Under the
+    documents' law particle spheres change it by exactly -(1 - b) mu_r (R_A + R_B) n x u_p in each impact (RULES, consequence 1).
+    """
+    contacts = [scene.contact, *(contact for _, _, contact in scene.pairs)]
+    rubbing = any(c.friction > 0 if law == "nc" else c.viscosity > 0 for c in contacts)
+    if scene.statics or (rubbing and not scene.model.rotation):
+        return None
+    mass = masses(scene)
+    centre = np.einsum("n,tni->ti", mass, trajectory.positions) / mass.sum()
+    drift_velocity = np.einsum("n,tni->ti", mass, trajectory.velocities) / mass.sum()
+    arms, speeds = trajectory.positions - centre[:, None], trajectory.velocities - drift_velocity[:, None]
+    total = np.einsum("n,tni->ti", mass, np.cross(arms, speeds))
+    scale = np.einsum("n,tn,tn->t", mass, np.linalg.norm(arms, axis=2), np.linalg.norm(speeds, axis=2))
+    if trajectory.spins is not None:
+        spin = spin_momenta(scene, trajectory)
+        total, scale = total + spin.sum(axis=1), scale + np.linalg.norm(spin, axis=2).sum(axis=1)
+    expected = np.zeros_like(total)
+    if law == "doc" and not scene.model.rotation:
+        for impact in impacts:
+            expected[impact.last_step + 1 :] += _shared_sliding(scene, impact)
+    largest = float(scale.max())
+    return float(np.linalg.norm(total - total[0] - expected, axis=1).max()) / largest if largest > 0 else 0.0
+
+
+def _shared_sliding(scene: Scene, impact: Impact) -> Floats:
+    a, b = scene.bodies[impact.a], scene.bodies[impact.b]
+    assert a.mass is not None
+    assert b.mass is not None
+    reduced = a.mass * b.mass / (a.mass + b.mass)
+    tangential = impact.before - (impact.before @ impact.normal) * impact.normal
+    reach = getattr(a.shape, "radius", 0.0) + getattr(b.shape, "radius", 0.0)
+    bounciness = scene.contact_of(impact.a, impact.b).bounciness
+    return np.asarray(-(1 - bounciness) * reduced * reach * np.cross(impact.normal, tangential))
+
+
+def spin_momenta(scene: Scene, trajectory: Trajectory) -> Floats:
+    """Angular momenta of the bodies about their own centres [kg m^2/s], world axes, shape [T, n, 3]. Locked axes carry none."""
+    assert trajectory.spins is not None
+    assert trajectory.orientations is not None
+    inertia = np.array([scene.bodies[index].principal_inertia() for index in scene.movable])
+    inertia = np.where(np.isfinite(inertia), inertia, 0.0)
+    axes = rotation_matrices(trajectory.orientations)
+    own = np.einsum("tnij,tni->tnj", axes, trajectory.spins) * inertia
+    momenta: Floats = np.einsum("tnij,tnj->tni", axes, own)
+    return momenta
+
+
+def energies(scene: Scene, trajectory: Trajectory) -> Floats:
+    """Kinetic, spin and potential energy [J], shape [T]; potential is 0 at the origin."""
+    mass = masses(scene)
+    energy = 0.5 * np.einsum("n,tni,tni->t", mass, trajectory.velocities, trajectory.velocities)
+    energy -= np.einsum("n,tni,i->t", mass, trajectory.positions, np.array(scene.gravity))
+    if trajectory.spins is not None:
+        energy += 0.5 * np.einsum("tni,tni->t", trajectory.spins, spin_momenta(scene, trajectory))
+    return energy
+
+
+def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
+    """What to add to `energies` so that positions and velocities belong to one instant [J], shape [T].
+
+    In free flight a step moves a body by h (alpha v + (1 - alpha) v'): alpha is 0 where velocity goes first, 1 where position does, 1/2 for
+    an exact parabola. The energy that such a scheme keeps is E + (1/2 - alpha) h m g . v. alpha is measured from the steps in which the velocity
+    changed by g h and nothing else; a run without such a step needs no correction.
+    """
+    gravity = np.array(scene.gravity)
+    weight2 = float(gravity @ gravity)
+    steps = np.diff(trajectory.times)
+    if weight2 == 0 or len(steps) == 0:
+        return np.zeros(len(trajectory.times))
+    change = np.diff(trajectory.velocities, axis=0)
+    fall = gravity * steps[:, None]
+    free = np.linalg.norm(change - fall[:, None], axis=2) <= 1e-6 * np.linalg.norm(fall, axis=1)[:, None]
+    late = (np.diff(trajectory.positions, axis=0) / steps[:, None, None] - trajectory.velocities[1:]) @ gravity / (-weight2 * steps[:, None])
+    alpha = float(np.median(late[free])) if free.any() else 0.5
+    step = np.concatenate([steps[:1], steps])
+    power = np.einsum("n,tni,i->t", masses(scene), trajectory.velocities, gravity)
+    return np.asarray((0.5 - alpha) * step * power)

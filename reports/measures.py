@@ -1,0 +1,171 @@
+"""All measures of one run, from its trajectory, its scene and the truth of its own law: one code path for every contestant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactbench.reports import conservation
+from impactbench.reports.impacts import Impact, PairHistory, find_impacts, impact_error, pair_histories, restitution
+from impactbench.scenarios.records import Law, Scene
+from impactbench.scenarios.trajectory import State, Trajectory
+from impactbench.scenarios.truth import Case, Truth
+
+COMPARED_TIMES = 60
+"""Trajectory errors are taken at about this many steps, spread evenly over the run, the last one included."""
+
+UNITS = {"impact_time_error": "s"} | dict.fromkeys(("wall_time", "wall_time_min", "wall_time_low", "wall_time_high"), "s/s")
+"""Units of the measures that are not dimensionless."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured number. Errors are fractions of the scene's own length, speed or energy scale."""
+
+    measure: str
+    value: float
+
+    @property
+    def unit(self) -> str:
+        return UNITS.get(self.measure, "1")
+
+
+def measure(case: Case, law: Law, trajectory: Trajectory, delay: float = 0.0) -> list[Figure]:
+    """Every figure this run can give; `delay` [s] is how much later than in the truth everything happens (see `shifted`).
+
+    The trajectory must be finite; a measure without meaning in the scene is absent.
+    """
+    scene = case.scene
+    pairs = pair_histories(scene, trajectory)
+    impacts = [] if scene.model.rotation else find_impacts(scene, trajectory, pairs)
+    return [
+        *_against_truth(scene, case.truths[law], trajectory, delay),
+        *_conserved(scene, law, case.truths[law], trajectory, pairs, impacts, delay),
+        *_at_impacts(scene, law, case.truths[law], trajectory, impacts, delay),
+        *_penetration(scene, pairs),
+    ]
+
+
+def _against_truth(scene: Scene, truth: Truth, trajectory: Trajectory, delay: float) -> Iterator[Figure]:
+    last = len(trajectory.times) - 1
+    end = truth.state(float(trajectory.times[last]) - delay)
+    if end is not None:
+        yield Figure("position_error", _distance(trajectory.positions[last], end) / scene.length)
+        yield Figure("velocity_error", _largest(trajectory.velocities[last] - end.velocities) / scene.speed)
+        if end.spins is not None and trajectory.spins is not None:
+            yield Figure("spin_error", _largest(trajectory.spins[last] - end.spins) * scene.length / scene.speed)
+    if truth.kind != "trajectory":
+        return
+    squares = []
+    for k in np.unique(np.linspace(0, last, COMPARED_TIMES + 1).round().astype(int)):
+        time = float(trajectory.times[k]) - delay
+        state = truth.state(time) if time >= 0 else None
+        if state is not None:
+            squares.append(_distance(trajectory.positions[k], state) ** 2)
+    if squares:
+        yield Figure("trajectory_error", math.sqrt(sum(squares) / len(squares)) / scene.length)
+
+
+def _distance(positions: np.ndarray, state: State) -> float:
+    return _largest(positions - state.positions)
+
+
+def _largest(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=-1).max())
+
+
+def _conserved(
+    scene: Scene,
+    law: Law,
+    truth: Truth,
+    trajectory: Trajectory,
+    pairs: list[PairHistory],
+    impacts: list[Impact],
+    delay: float,
+) -> Iterator[Figure]:
+    yield Figure("momentum_drift", conservation.momentum_drift(scene, law, trajectory, pairs))
+    angular = conservation.angular_momentum_drift(scene, law, trajectory, impacts)
+    if angular is not None:
+        yield Figure("angular_momentum_drift", angular)
+    raw, offset = conservation.energies(scene, trajectory), conservation.matched_offset(scene, trajectory)
+    matched = raw + offset
+    yield Figure("offset_energy", float(np.abs(offset).max()) / scene.energy)
+    yield Figure("energy_gain", float((matched - np.minimum.accumulate(matched)).max()) / scene.energy)
+    expected = _expected_energy(scene, law, truth, trajectory, delay)
+    if expected is not None:
+        yield Figure("energy_drift", float(matched[-1] - expected) / scene.energy)
+        yield Figure("energy_drift_raw", float(raw[-1] - expected) / scene.energy)
+
+
+def _expected_energy(scene: Scene, law: Law, truth: Truth, trajectory: Trajectory, delay: float) -> float | None:
+    """Energy the law leaves at the end [J]: the truth's, or the initial one where nothing dissipates."""
+    end = truth.state(float(trajectory.times[-1]) - delay)
+    if end is None:
+        contacts = [scene.contact, *(contact for _, _, contact in scene.pairs)]
+        lossless = all(c.bounciness == 1 and (c.friction if law == "nc" else c.viscosity) == 0 for c in contacts)
+        return float(conservation.energies(scene, _at(trajectory, 0))[0]) if lossless else None
+    turning = trajectory.spins is not None and end.spins is not None and end.orientations is not None
+    snapshot = Trajectory(
+        trajectory.times[-1:],
+        end.positions[None],
+        end.velocities[None],
+        end.orientations[None] if turning and end.orientations is not None else None,
+        end.spins[None] if turning and end.spins is not None else None,
+    )
+    return float(conservation.energies(scene, snapshot)[0])
+
+
+def _at(trajectory: Trajectory, index: int) -> Trajectory:
+    pick = slice(index, index + 1)
+    return replace(
+        trajectory,
+        times=trajectory.times[pick],
+        positions=trajectory.positions[pick],
+        velocities=trajectory.velocities[pick],
+        orientations=None if trajectory.orientations is None else trajectory.orientations[pick],
+        spins=None if trajectory.spins is None else trajectory.spins[pick],
+    )
+
+
+def _at_impacts(
+    scene: Scene, law: Law, truth: Truth, trajectory: Trajectory, impacts: list[Impact], delay: float
+) -> Iterator[Figure]:
+    if not impacts:
+        return
+    step = float(trajectory.times[1] - trajectory.times[0])
+    yield Figure("impact_velocity_error", max(impact_error(scene, law, impact, step) for impact in impacts))
+    if not any(scene.gravity):
+        # Under gravity the samples straddle a step's worth of it: e is measured without (METHOD).
+        first = impacts[0]
+        measured = restitution(first)
+        yield Figure("restitution_measured", measured)
+        yield Figure("restitution_error", measured - scene.contact_of(first.a, first.b).bounciness)
+    if truth.impact_times:
+        yield Figure("impact_time_error", impacts[0].time - delay - truth.impact_times[0])
+
+
+def _penetration(scene: Scene, pairs: list[PairHistory]) -> Iterator[Figure]:
+    """Deepest overlap of any pair over all steps, its root mean square over time, and the overlap left at the end."""
+    if not pairs:
+        return
+    depth = np.maximum(-np.min([pair.gap for pair in pairs], axis=0), 0.0) / scene.length
+    yield Figure("penetration_max", float(depth.max()))
+    yield Figure("penetration_rms", float(np.sqrt(np.mean(depth**2))))
+    yield Figure("penetration_final", float(depth[-1]))
+
+
+def law_difference(case: Case) -> list[Figure]:
+    """Distance between the two truths at the end of the run: a property of the laws, no contestant's error."""
+    if not {"doc", "nc"} <= set(case.truths):
+        return []
+    scene = case.scene
+    doc, newton = (case.truths[law].state(scene.duration) for law in ("doc", "nc"))  # type: ignore[index]
+    if doc is None or newton is None:
+        return []
+    return [
+        Figure("position_difference", _largest(doc.positions - newton.positions) / scene.length),
+        Figure("velocity_difference", _largest(doc.velocities - newton.velocities) / scene.speed),
+    ]

@@ -1,0 +1,62 @@
+"""The results document: what it holds, how it is written (whole or not at all) and how it is read."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA = 1
+
+
+class ResultsError(Exception):
+    """A results file cannot be read or written. One line: what, where, what is possible instead."""
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace `path` by a file with this text: readers see the old file or the new one, never a part."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        # mkstemp makes files private; a report is to be read by whoever may read its folder.
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def save(document: dict[str, Any], path: Path) -> None:
+    """Write the document as JSON. Numbers are finite by contract: NaN or infinity raises ValueError and leaves the old file alone."""
+    write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The document at `path`. Raises ResultsError where it is missing, broken or of another schema."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ResultsError(f"cannot read {path}: {error.strerror}; `impactbench compare` writes one") from None
+    except ValueError as error:
+        raise ResultsError(f"{path} is not a results file: {error}") from None
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
+        raise ResultsError(f"{path} has results schema {schema!r}, this version reads {SCHEMA}: run `impactbench compare` again")
+    return dict(document)
+
+
+def frame(document: dict[str, Any]) -> pd.DataFrame:
+    """One tidy row per cell and measure; a cell without figures keeps one row with no measure, so that nothing is dropped."""
+    import pandas as pd
+
+    cells = pd.DataFrame(document["cells"]).rename_axis("cell").reset_index()
+    rows = pd.DataFrame(document["rows"], columns=["cell", "measure", "value", "unit"])
+    return cells.merge(rows, on="cell", how="left")

@@ -1,0 +1,95 @@
+"""What the command line prints: short tables, drawn by rich into plain text."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from impactbench.adapters import contestants
+from impactbench.scenarios.catalogue import FAMILIES
+
+
+def _text(table: Table, width: int = 110) -> str:
+    stream = io.StringIO()
+    Console(file=stream, width=width, no_color=True, highlight=False).print(table)
+    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
+
+
+def _table(columns: Iterable[str], rows: Iterable[Sequence[str]], right: int = 99) -> str:
+    """Columns from number `right` on hold figures and are set flush right."""
+    table = Table(box=None, pad_edge=False)
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="right" if number >= right else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*(_escape(cell) for cell in row))
+    return _text(table)
+
+
+def _escape(text: str) -> str:
+    from rich.markup import escape
+
+    return escape("".join(c if c.isprintable() else "?" for c in text))
+
+
+def summary(document: dict[str, Any]) -> str:
+    """A line per contestant: cells by state, and the worst headline error and energy gain at its finest step."""
+    headline = {case["name"]: case["headline"] for case in document["cases"]}
+    cells = document["cells"]
+    states: dict[str, Counter[str]] = {}
+    for cell in cells:
+        states.setdefault(cell["contestant"], Counter())[cell["state"]] += 1
+    finest = min((cell["step"] for cell in cells), default=0.0)
+    worst: dict[tuple[str, str], tuple[float, str]] = {}
+    for row in document["rows"]:
+        cell = cells[row["cell"]]
+        kind = "error" if row["measure"] == headline[cell["case"]] else row["measure"]
+        if cell["step"] == finest and kind in ("error", "energy_gain", "momentum_drift"):
+            key = (cell["contestant"], kind)
+            worst[key] = max(worst.get(key, (-1.0, "")), (abs(row["value"]), cell["case"]))
+    rows = []
+    for name, counts in states.items():
+        others = ", ".join(f"{count} {state}" for state, count in counts.items() if state != "ok") or "-"
+        figures = [worst.get((name, kind)) for kind in ("error", "energy_gain", "momentum_drift")]
+        shown = [f"{figure[0]:.2g}" if figure else "-" for figure in figures]
+        rows.append([name, str(counts["ok"]), others, *shown, figures[0][1] if figures[0] else "-"])
+    columns = ["contestant", "ok", "other cells", "worst error", "energy gain", "momentum", "worst error in"]
+    return _table(columns, rows)
+
+
+def cell_table(document: dict[str, Any]) -> str:
+    """One cell: what it was, what was set, and every measure."""
+    cell = document["cells"][0]
+    head = f"{cell['case']}  {cell['contestant']}  law {cell['law']}  model {cell['model']}  step {cell['step_text']} s: {cell['state']}"
+    if cell["reason"]:
+        head += f" ({cell['reason']})"
+    rows = [[row["measure"], f"{row['value']:.6g}", "" if row["unit"] == "1" else row["unit"]] for row in document["rows"]]
+    settings = [[name, str(value)] for name, value in cell["settings"].items()]
+    parts = [head]
+    if rows:
+        parts.append(_table(["measure", "value", "unit"], rows, right=1))
+    if settings:
+        parts.append(_table(["set", "to"], settings))
+    return "\n\n".join(parts)
+
+
+def scenario_table() -> str:
+    rows = []
+    for family in FAMILIES.values():
+        cases = family.cases()
+        kinds = {truth.kind for case in cases for truth in case.truths.values()}
+        laws = [law for law in ("doc", "nc") if any(law in case.truths for case in cases)]
+        rows.append([family.name, str(len(cases)), " ".join(laws), ", ".join(sorted(kinds)), family.needs, family.question])
+    return _table(["scenario", "cases", "laws", "truth", "needs", "question"], rows)
+
+
+def engine_table() -> str:
+    rows = []
+    for contestant in contestants.CONTESTANTS.values():
+        why = contestant.availability()
+        rows.append([contestant.name, contestant.version() or "-", why or "available"])
+    return _table(["contestant", "version", "here"], rows)
