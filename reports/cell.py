@@ -12,19 +12,20 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-
 from impactbench.adapters.contestants import Contestant
 from impactbench.reports.measures import Figure, measure
 from impactbench.scenarios import catalogue
 from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
 from impactbench.scenarios.records import FULL, Law, Scene, shifted
-from impactbench.scenarios.trajectory import State, Trajectory
+from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What identifies a cell. `step` is text such as 1/240, so that it names the same number everywhere; `phase` is in steps."""
+    """What identifies a cell. `step` is text such as 1/240, so that it names the same number everywhere; `phase` is
+    in steps.
+    """
 
     case: str
     law: Law
@@ -106,10 +107,10 @@ def record(engine: Engine, step: float, count: int) -> Trajectory:
     for _ in range(count):
         engine.advance(1)
         states.append(engine.read())
-    return stack(step * np.arange(count + 1), states)
+    return stack(np.arange(count + 1) * np.float64(step), states)
 
 
-def stack(times: np.ndarray[tuple[int], np.dtype[np.float64]], states: Sequence[State]) -> Trajectory:
+def stack(times: Floats, states: Sequence[State]) -> Trajectory:
     first = states[0]
     turning = first.spins is not None and first.orientations is not None
     return Trajectory(
@@ -135,9 +136,10 @@ def _plain(value: object) -> object:
 
 
 def time_cells(argument: tuple[Sequence[tuple[Cell, Contestant]], int]) -> dict[str, list[float]]:
-    """Wall seconds per simulated second of each cell, one number a round; cells take turns, in alternating order, after a warm-up round.
+    """Wall seconds per simulated second of each cell, one number a round: cells take turns, in alternating order.
 
-    Building is outside the clock; nothing is read inside it. A run whose final state is not finite has no speed and is left out.
+    A warm-up round goes first. Building is outside the clock; nothing is read inside it. A run whose final state is
+    not finite has no speed and is left out.
     """
     cells, rounds = argument
     times: dict[str, list[float]] = {cell.key: [] for cell, _ in cells}
@@ -180,9 +182,10 @@ def timing_figures(seconds: Sequence[float]) -> list[Figure]:
 
 
 def median_ranks(count: int) -> tuple[int, int]:
-    """Ranks (from 0) of the narrowest symmetric pair of order statistics that brackets the median with probability >= 0.95.
+    """Ranks (from 0) of the narrowest symmetric pair of order statistics that brackets the median with at least 95 %.
 
-    P(the median is below the k-th smallest) = sum over i < k of C(n, i) / 2^n. With fewer than 6 values no pair does: the extremes.
+    P(the median is below the k-th smallest) = sum over i < k of C(n, i) / 2^n. With fewer than 6 values no pair
+    does so: then the extremes.
     """
     outside, low = 0.0, 0
     while low < count // 2:

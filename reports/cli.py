@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from impactbench.adapters.contestants import Contestant
     from impactbench.reports.compare import Progress
     from impactbench.scenarios.records import Law
+    from impactbench.scenarios.truth import Case
 
 NOTHING_MEASURED = 3
+STEP_HELP = "Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960."
+TIMING_HELP = "Time a case of each of six families, every case, or none."
 ENGINE_HELP = "An engine (mujoco), a contestant (mujoco/tuned), a glob, or FILE.py:Class for your own. Repeatable."
 
 
@@ -40,7 +43,9 @@ class _Plain(click.Group):
 @click.group(cls=_Plain, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="impactbench")
 def main() -> None:
-    """Compare rigid-body engines on contact scenes with known truth: momentum, energy, penetration, speed against error."""
+    """Compare rigid-body engines on contact scenes with known truth: momentum, energy, penetration, speed against
+    error.
+    """
 
 
 def _steps(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
@@ -63,7 +68,7 @@ def _contestants(engines: Sequence[str], profile: str) -> list[Contestant]:
         raise click.UsageError(str(error)) from None
 
 
-def _cases(names: Sequence[str]) -> list[Any]:
+def _cases(names: Sequence[str]) -> list[Case]:
     from impactbench.scenarios import catalogue
 
     try:
@@ -79,7 +84,8 @@ def _folder(path: Path) -> Path:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise click.UsageError(f"cannot write to {path}: {error.strerror}; choose another folder with --out") from None
+        message = f"cannot write to {path}: {error.strerror}; choose another folder with --out"
+        raise click.UsageError(message) from None
     return path
 
 
@@ -109,11 +115,13 @@ def _progress() -> Iterator[Progress]:
 @click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
 @click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
 @click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
-@click.option("--step", "steps", multiple=True, callback=_steps, help="Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960.")
+@click.option("--step", "steps", multiple=True, callback=_steps, help=STEP_HELP)
 @click.option("--model", type=click.Choice(["minimal", "full", "both"]), default="minimal", show_default=True)
-@click.option("--timing", type=click.Choice(["some", "all", "none"]), default="some", show_default=True, help="Which cases to time.")
+@click.option(
+    "--timing", type=click.Choice(["some", "all", "none"]), default="some", show_default=True, help=TIMING_HELP
+)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
-@click.option("--jobs", type=click.IntRange(1, 256), default=lambda: os.cpu_count() or 1, help="Cells run at once. Default: cores.")
+@click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Cells run at once. Default: cores.")
 def compare(
     cases: tuple[str, ...],
     engines: tuple[str, ...],
@@ -127,7 +135,8 @@ def compare(
 ) -> None:
     """Run scenarios on all contestants and write OUT/results.json and OUT/report.html.
 
-    CASE is a family (equal_masses), a case (equal_masses[bounciness=0.5]) or a glob; none means all. Exit code 3: nothing was measured.
+    CASE is a family (equal_masses), a case (equal_masses[bounciness=0.5]) or a glob; none means all. Exit code 3:
+    nothing was measured.
     """
     chosen, contestants, folder = _cases(cases), _contestants(engines, profile), _folder(out)
 
@@ -154,7 +163,8 @@ def _write(document: dict[str, Any], folder: Path) -> None:
         results.save(document, folder / "results.json")
         page.write_page(document, folder / "report.html")
     except OSError as error:
-        raise click.UsageError(f"cannot write to {folder}: {error.strerror}; earlier files there are untouched") from None
+        message = f"cannot write to {folder}: {error.strerror}; earlier files there are untouched"
+        raise click.UsageError(message) from None
 
 
 @main.command()
@@ -164,16 +174,26 @@ def _write(document: dict[str, Any], folder: Path) -> None:
 @click.option("--profile", type=click.Choice(["default", "tuned"]), default="tuned", show_default=True)
 @click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
 @click.option("--model", type=click.Choice(["minimal", "full"]), default="minimal", show_default=True)
-@click.option("--phase", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="Start this part of a step earlier.")
+@click.option(
+    "--phase", type=click.FloatRange(0, 1), default=0.0, show_default=True, help="Start this part of a step earlier."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the cell as JSON.")
 def run(
-    case: str, engine: str, steps: tuple[str, ...], profile: str, law: Law | None, model: str, phase: float, as_json: bool
+    case: str,
+    engine: str,
+    steps: tuple[str, ...],
+    profile: str,
+    law: Law | None,
+    model: str,
+    phase: float,
+    as_json: bool,
 ) -> None:
     """Run one cell and print all its measures. Exit code 3: it could not be measured."""
     chosen, contestants = _cases([case]), _contestants([engine], profile)
     if len(chosen) != 1 or len(contestants) != 1 or len(steps) != 1:
-        names = ", ".join(c.scene.name for c in chosen[:4]) if len(chosen) != 1 else ", ".join(c.name for c in contestants[:4])
-        raise click.UsageError(f"run takes one case, one contestant and one step; got {len(chosen)}, {len(contestants)}, {len(steps)} ({names}, ...)")
+        names = [c.scene.name for c in chosen] if len(chosen) != 1 else [c.name for c in contestants]
+        got = f"{len(chosen)} cases, {len(contestants)} contestants, {len(steps)} steps ({', '.join(names[:4])}, ...)"
+        raise click.UsageError(f"run takes one case, one contestant and one step; got {got}")
     if phase and not chosen[0].scene.phase_free:
         raise click.UsageError(f"{chosen[0].scene.name}: bodies touch at t = 0, so that --phase must be 0")
 

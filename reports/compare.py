@@ -26,9 +26,12 @@ ROUNDS = 10
 CELL_LIMIT = 60.0
 """Seconds one cell may take: a hundred times the slowest healthy one of the default set."""
 TIMED_FAMILIES = ("free_flight", "equal_masses", "box_of_walls", "bouncing_ball", "stacked_drop", "coulomb_slide")
-"""The timing lane runs one case of each by default: free flight, one impact, many one-way impacts, gravity, resting contact, friction."""
+"""The timing lane runs one case of each by default: free flight, one impact, many one-way impacts, gravity, resting
+contact, friction.
+"""
 
 Progress = Callable[[str, int, int], None]
+Entry = tuple[Cell, Contestant]
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Plan:
     jobs: int = 1
     timing: str = "some"
 
-    def cells(self) -> list[tuple[Cell, Contestant]]:
+    def cells(self) -> list[Entry]:
         """In an order that keeps an engine's cells together."""
         return [
             (Cell(case.scene.name, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
@@ -57,7 +60,9 @@ class Plan:
 
 
 def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:
-    """Engines realise Newton-Coulomb; the reference runs the law asked for, the documents' by default. A scene of one law has no choice."""
+    """Engines realise Newton-Coulomb; the reference the law asked for, else the documents'. A scene of one law has
+    no choice.
+    """
     laws = case.scene.laws
     wanted = asked if asked and contestant.chooses_law else contestant.law
     return wanted if wanted in laws else laws[0]
@@ -67,14 +72,16 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
     """Run the plan and return the results document. One cell's fault costs that cell alone."""
     cells = plan.cells()
     load = os.getloadavg()[0]
-    document = {
+    document: dict[str, Any] = {
         "schema": results.SCHEMA,
         "provenance": provenance(command, plan.contestants, load),
         "cases": [describe(case) for case in plan.cases],
         "cells": [],
         "rows": [],
         "law_difference": [
-            {"case": case.scene.name} | asdict(figure) | {"unit": figure.unit} for case in plan.cases for figure in law_difference(case)
+            {"case": case.scene.name, **asdict(figure), "unit": figure.unit}
+            for case in plan.cases
+            for figure in law_difference(case)
         ],
     }
     outcomes = accuracy_lane(cells, plan.jobs, progress)
@@ -89,7 +96,7 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
     return document
 
 
-def accuracy_lane(cells: Sequence[tuple[Cell, Contestant]], jobs: int, progress: Progress) -> dict[str, dict[str, Any]]:
+def accuracy_lane(cells: Sequence[Entry], jobs: int, progress: Progress) -> dict[str, dict[str, Any]]:
     """Every cell once, in parallel; deterministic whatever the number of workers."""
     outcomes: dict[str, dict[str, Any]] = {}
     missing = {contestant.name: why for _, contestant in cells if (why := contestant.availability())}
@@ -114,7 +121,7 @@ def _as_cell(outcome: Outcome) -> dict[str, Any]:
     return {"state": outcome.state, "reason": outcome.reason}
 
 
-def _timed(plan: Plan, cells: Sequence[tuple[Cell, Contestant]], outcomes: dict[str, dict[str, Any]]) -> list[list[tuple[Cell, Contestant]]]:
+def _timed(plan: Plan, cells: Sequence[Entry], outcomes: dict[str, dict[str, Any]]) -> list[list[Entry]]:
     """Groups of cells to be timed against one another: one group a case, healthy cells of the first phase only."""
     first: dict[str, str] = {}
     for case in plan.cases:
@@ -124,18 +131,19 @@ def _timed(plan: Plan, cells: Sequence[tuple[Cell, Contestant]], outcomes: dict[
         if plan.timing == "all"
         else {name for family, name in first.items() if family in TIMED_FAMILIES or len(first) <= len(TIMED_FAMILIES)}
     )
-    groups: dict[str, list[tuple[Cell, Contestant]]] = {}
+    groups: dict[str, list[Entry]] = {}
     for cell, contestant in cells:
         if cell.case in names and cell.phase == plan.phases[0] and outcomes[cell.key]["state"] == "ok":
             groups.setdefault(cell.case, []).append((cell, contestant))
     return list(groups.values())
 
 
-def timing_lane(groups: Sequence[list[tuple[Cell, Contestant]]], progress: Progress) -> dict[str, list[float]]:
+def timing_lane(groups: Sequence[list[Entry]], progress: Progress) -> dict[str, list[float]]:
     """One process, one thread, one case after another; a group that fails has no times, and its accuracy stands."""
     limit = CELL_LIMIT * ROUNDS
     work = [
-        Job(group[0][0].case, "timing", "impactbench.reports.cell:time_cells", (group, ROUNDS), limit) for group in groups
+        Job(group[0][0].case, "timing", "impactbench.reports.cell:time_cells", (group, ROUNDS), limit)
+        for group in groups
     ]
     times: dict[str, list[float]] = {}
     for done, outcome in enumerate(run_jobs(work, 1), 1):
@@ -195,7 +203,7 @@ def provenance(command: str, contestants: Iterable[Contestant], load: float) -> 
         "processor": _processor(),
         "cores": os.cpu_count() or 1,
         "commit": _commit(),
-        "versions": {contestant.engine: contestant.version() for contestant in contestants} | {"numpy": metadata.version("numpy")},
+        "versions": {c.engine: c.version() for c in contestants} | {"numpy": metadata.version("numpy")},
         "load": load,
         "notes": [f"the machine was busy when this began (load {load:.1f}): times may be too long"] if busy else [],
     }

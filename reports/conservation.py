@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-
 from impactbench.reports.geometry import rotation_matrices
 from impactbench.reports.impacts import Impact, PairHistory
 from impactbench.scenarios.records import Law, Scene
@@ -18,13 +17,15 @@ def masses(scene: Scene) -> Floats:
 def momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, pairs: list[PairHistory]) -> float:
     """Largest norm of the momentum that no contact could have given, relative to the largest sum of m |v|.
 
-    Without statics that is P - P0 - M g t. A static gives impulses along its normal while it is touched, and, with Coulomb friction, up to
-    mu times that along its plane; under the documents' law an impact with b < 1 or viscous friction may act in any direction (R8, R9).
+    Without statics that is P - P0 - M g t. A static gives impulses along its normal while it is touched and, with
+    Coulomb friction, up to mu times that along its plane; under the documents' law an impact with b < 1 or viscous
+    friction may act in any direction (R5, R8, R9).
     """
     mass = masses(scene)
     momenta = np.einsum("n,tni->ti", mass, trajectory.velocities)
     scale = max(
-        float(np.einsum("n,tn->t", mass, np.linalg.norm(trajectory.velocities, axis=2)).max()), float(mass.max()) * scene.speed
+        float(np.einsum("n,tn->t", mass, np.linalg.norm(trajectory.velocities, axis=2)).max()),
+        float(mass.max()) * scene.speed,
     )
     steps = np.diff(trajectory.times)
     excess = np.diff(momenta, axis=0) - mass.sum() * np.outer(steps, scene.gravity)
@@ -54,8 +55,8 @@ def _impossible_part(scene: Scene, law: Law, impulse: Floats, contacts: list[Pai
     coefficients = [scene.contact_of(pair.a, pair.b) for pair in contacts]
     if law == "doc" and any(c.bounciness < 1 or c.viscosity > 0 for c in coefficients):
         return np.zeros(3)
-    normals = np.array([pair.normal[k] for pair in contacts]).T
-    along = normals @ np.linalg.lstsq(normals, impulse, rcond=None)[0]
+    normals: Floats = np.array([pair.normal[k] for pair in contacts]).T
+    along: Floats = normals @ np.linalg.lstsq(normals, impulse, rcond=None)[0]
     beyond = impulse - along
     size = float(np.linalg.norm(beyond))
     allowed = max(c.friction for c in coefficients) * float(np.linalg.norm(along)) if law == "nc" else 0.0
@@ -63,10 +64,12 @@ def _impossible_part(scene: Scene, law: Law, impulse: Floats, contacts: list[Pai
 
 
 def angular_momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, impacts: list[Impact]) -> float | None:
-    """Largest change of the angular momentum about the common centre of mass, relative to the largest sum of m |r| |v| (and spin).
+    """Largest change of the angular momentum about the common centre of mass, over the largest sum of m |r| |v| and
+    spin.
 
-    None where the law does not conserve it: with statics, or with friction between bodies whose rotation is not modelled. Under the
-    documents' law particle spheres change it by exactly -(1 - b) mu_r (R_A + R_B) n x u_p in each impact (RULES, consequence 1).
+    None where the law does not conserve it: with statics, or with friction between bodies whose rotation is not
+    modelled. Under the documents' law particle spheres change it by exactly -(1 - b) mu_r (R_A + R_B) n x u_p in
+    each impact (RULES, consequence 1).
     """
     contacts = [scene.contact, *(contact for _, _, contact in scene.pairs)]
     rubbing = any(c.friction > 0 if law == "nc" else c.viscosity > 0 for c in contacts)
@@ -101,7 +104,9 @@ def _shared_sliding(scene: Scene, impact: Impact) -> Floats:
 
 
 def spin_momenta(scene: Scene, trajectory: Trajectory) -> Floats:
-    """Angular momenta of the bodies about their own centres [kg m^2/s], world axes, shape [T, n, 3]. Locked axes carry none."""
+    """Spin angular momenta about the bodies' own centres [kg m^2/s], world axes, shape [T, n, 3]; locked axes carry
+    none.
+    """
     assert trajectory.spins is not None
     assert trajectory.orientations is not None
     inertia = np.array([scene.bodies[index].principal_inertia() for index in scene.movable])
@@ -115,7 +120,7 @@ def spin_momenta(scene: Scene, trajectory: Trajectory) -> Floats:
 def energies(scene: Scene, trajectory: Trajectory) -> Floats:
     """Kinetic, spin and potential energy [J], shape [T]; potential is 0 at the origin."""
     mass = masses(scene)
-    energy = 0.5 * np.einsum("n,tni,tni->t", mass, trajectory.velocities, trajectory.velocities)
+    energy: Floats = 0.5 * np.einsum("n,tni,tni->t", mass, trajectory.velocities, trajectory.velocities)
     energy -= np.einsum("n,tni,i->t", mass, trajectory.positions, np.array(scene.gravity))
     if trajectory.spins is not None:
         energy += 0.5 * np.einsum("tni,tni->t", trajectory.spins, spin_momenta(scene, trajectory))
@@ -125,9 +130,10 @@ def energies(scene: Scene, trajectory: Trajectory) -> Floats:
 def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
     """What to add to `energies` so that positions and velocities belong to one instant [J], shape [T].
 
-    In free flight a step moves a body by h (alpha v + (1 - alpha) v'): alpha is 0 where velocity goes first, 1 where position does, 1/2 for
-    an exact parabola. The energy that such a scheme keeps is E + (1/2 - alpha) h m g . v. alpha is measured from the steps in which the velocity
-    changed by g h and nothing else; a run without such a step needs no correction.
+    In free flight a step moves a body by h (alpha v + (1 - alpha) v'): alpha is 0 where velocity goes first, 1 where
+    position does, 1/2 for an exact parabola. Such a scheme keeps E + (1/2 - alpha) h m g . v. alpha is measured
+    from the steps in which the velocity changed by g h and nothing else; a run without such a step needs no
+    correction.
     """
     gravity = np.array(scene.gravity)
     weight2 = float(gravity @ gravity)
@@ -137,7 +143,8 @@ def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
     change = np.diff(trajectory.velocities, axis=0)
     fall = gravity * steps[:, None]
     free = np.linalg.norm(change - fall[:, None], axis=2) <= 1e-6 * np.linalg.norm(fall, axis=1)[:, None]
-    late = (np.diff(trajectory.positions, axis=0) / steps[:, None, None] - trajectory.velocities[1:]) @ gravity / (-weight2 * steps[:, None])
+    lag = np.diff(trajectory.positions, axis=0) / steps[:, None, None] - trajectory.velocities[1:]
+    late = lag @ gravity / (-weight2 * steps[:, None])
     alpha = float(np.median(late[free])) if free.any() else 0.5
     step = np.concatenate([steps[:1], steps])
     power = np.einsum("n,tni,i->t", masses(scene), trajectory.velocities, gravity)

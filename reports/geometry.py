@@ -1,7 +1,8 @@
 """Signed gaps between bodies, from positions and shapes alone, over a whole trajectory at once.
 
-A gap [m] is positive where the bodies are apart and negative (a penetration) where they overlap; the unit normal points from the
-first body to the second. Arrays run over time: positions [T, 3], orientations as unit quaternions (w, x, y, z) [T, 4].
+A gap [m] is positive where the bodies are apart and negative (a penetration) where they overlap; the unit normal
+points from the first body to the second. Arrays run over time: positions [T, 3], orientations as unit quaternions
+(w, x, y, z) [T, 4].
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-
 from impactbench.scenarios.records import Box, Capsule, HalfSpace, Scene, Shape, Sphere
 from impactbench.scenarios.trajectory import Floats, Trajectory
 
@@ -96,19 +96,28 @@ def _from_half_space(plane: Placed, other: Placed) -> tuple[Floats, Floats]:
     return heights.min(axis=0) - radius, np.broadcast_to(normal, other.positions.shape)
 
 
+def _dot(u: Floats, v: Floats) -> Floats:
+    products: Floats = np.einsum("ti,ti->t", u, v)
+    return products
+
+
+def _nonzero(x: Floats) -> Floats:
+    return np.where(x > 0, x, 1.0)
+
+
 def _between_cores(a: Placed, b: Placed) -> tuple[Floats, Floats]:
-    """Balls and capsules: distance of the core segments (Ericson, Real-Time Collision Detection, 5.1.9) less the radii."""
+    """Balls and capsules: distance of the core segments (Ericson, Real-Time Collision Detection, 5.1.9) less the
+    radii.
+    """
     (p1, q1), ra = a.core()
     (p2, q2), rb = b.core()
     d1, d2, r = q1 - p1, q2 - p2, p1 - p2
-    dot = lambda u, v: np.einsum("ti,ti->t", u, v)  # noqa: E731
-    aa, ee, f, c, bb = dot(d1, d1), dot(d2, d2), dot(d2, r), dot(d1, r), dot(d1, d2)
-    safe = lambda x: np.where(x > 0, x, 1.0)  # noqa: E731
+    aa, ee, f, c, bb = _dot(d1, d1), _dot(d2, d2), _dot(d2, r), _dot(d1, r), _dot(d1, d2)
     denominator = aa * ee - bb * bb
-    s = np.where(denominator > 1e-12 * aa * ee, np.clip((bb * f - c * ee) / safe(denominator), 0, 1), 0.0)
-    t = np.where(ee > 0, (bb * s + f) / safe(ee), 0.0)
+    s = np.where(denominator > 1e-12 * aa * ee, np.clip((bb * f - c * ee) / _nonzero(denominator), 0, 1), 0.0)
+    t = np.where(ee > 0, (bb * s + f) / _nonzero(ee), 0.0)
     clipped = np.clip(t, 0, 1)
-    s = np.where((t != clipped) | (ee == 0), np.where(aa > 0, np.clip((bb * clipped - c) / safe(aa), 0, 1), 0.0), s)
+    s = np.where((t != clipped) | (ee == 0), np.where(aa > 0, np.clip((bb * clipped - c) / _nonzero(aa), 0, 1), 0.0), s)
     apart = (p2 + clipped[:, None] * d2) - (p1 + s[:, None] * d1)
     distance = np.linalg.norm(apart, axis=1)
     return distance - ra - rb, apart / np.where(distance > 0, distance, 1.0)[:, None]
@@ -133,7 +142,7 @@ def _ball_to_box(ball: Placed, box: Placed) -> tuple[Floats, Floats]:
 
 
 def _between_boxes(a: Placed, b: Placed) -> tuple[Floats, Floats]:
-    """Separating axes (faces and edge pairs): the largest separation over them. Exact where boxes overlap or a face is nearest."""
+    """Separating axes (faces, edge pairs): the largest separation. Exact where boxes overlap or a face is nearest."""
     assert isinstance(a.shape, Box)
     assert isinstance(b.shape, Box)
     apart = b.positions - a.positions

@@ -1,9 +1,11 @@
-"""Impacts, found in a trajectory and judged by the law of the run with their own measured pre-impact velocity and normal.
+"""Impacts, found in a trajectory and judged by the law of the run with their own measured pre-impact velocity and
+normal.
 
-An impact is an episode of consecutive steps in which the relative velocity of one pair jumps, begun while the bodies approach. Where the
-impact lies inside its step follows from the displacement: a body that moves with its old velocity for the fraction `alpha` of the step
-and with its new one for the rest travels h (alpha v + (1 - alpha) v'). So alpha is 0 for an engine that turns velocities round and then
-moves, 1 for one that moves first, and the true fraction for an event-driven run: one rule for all contestants.
+An impact is an episode of consecutive steps in which the relative velocity of one pair jumps, begun while the bodies
+approach. Where it lies inside its step follows from the displacement: a body that moves with its old velocity for the
+fraction `alpha` of the step and with its new one for the rest travels h (alpha v + (1 - alpha) v'). So alpha is 0
+for an engine that turns velocities round and then moves, 1 for one that moves first, and the true fraction for an
+event-driven run: one rule for all contestants.
 """
 
 from __future__ import annotations
@@ -13,10 +15,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-
 from impactbench.reports.geometry import Placed, gap, placed_bodies
 from impactbench.scenarios.records import Law, Scene
-from impactbench.scenarios.trajectory import Floats, Trajectory
+from impactbench.scenarios.trajectory import Flags, Floats, Trajectory
 
 # Ten thousand round-offs of the speed scale: below any impact that matters, above what sums of forces leave behind.
 JUMP = 1e-12
@@ -24,7 +25,9 @@ JUMP = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class PairHistory:
-    """One pair over time: scene indices, gap [T], normal from a to b [T, 3], relative velocity u = v_b - v_a [T, 3]."""
+    """One pair over time: scene indices, gap [T], normal from a to b [T, 3], relative velocity u = v_b - v_a [T,
+    3].
+    """
 
     a: int
     b: int
@@ -64,7 +67,9 @@ def pair_histories(scene: Scene, trajectory: Trajectory) -> list[PairHistory]:
 
 
 def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory]) -> list[Impact]:
-    """Isolated impacts in order of time. Those that share a body with another active contact have no outcome of their own and are left out."""
+    """Isolated impacts in order of time. One that shares a body with another active contact has no outcome of its
+    own: left out.
+    """
     if len(trajectory.times) < 2:
         return []
     steps = np.diff(trajectory.times)
@@ -87,8 +92,10 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
     return sorted(found, key=lambda impact: impact.time)
 
 
-def _active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Steps in which the pair's relative velocity changes along its normal by more than gravity does, while it is near contact."""
+def _active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Floats) -> Flags:
+    """Steps in which the relative velocity changes along the normal by more than gravity does, while the pair is
+    near contact.
+    """
     fall = np.zeros(3) if not (scene.bodies[pair.a].static or scene.bodies[pair.b].static) else gravity
     change = np.diff(pair.relative, axis=0) - fall * steps[:, None]
     kick = np.abs(np.einsum("ti,ti->t", change, pair.normal[:-1]))
@@ -98,7 +105,7 @@ def _active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Float
     return np.asarray(near & (kick > JUMP * scene.speed + 1e-9 * np.abs(fall).sum() * steps))
 
 
-def _episodes(flags: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Iterator[tuple[int, int]]:
+def _episodes(flags: Flags) -> Iterator[tuple[int, int]]:
     """First and last step of every run of set flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     yield from ((int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2))
@@ -139,7 +146,11 @@ def _normal_at(scene: Scene, trajectory: Trajectory, pair: PairHistory, k: int, 
         row = scene.movable.index(index)
         if trajectory.orientations is not None:
             turn = trajectory.orientations[k : k + 1, row]
-        return Placed(body.shape, trajectory.positions[k : k + 1, row] + alpha * step * trajectory.velocities[k : k + 1, row], turn)
+        return Placed(
+            body.shape,
+            trajectory.positions[k : k + 1, row] + alpha * step * trajectory.velocities[k : k + 1, row],
+            turn,
+        )
 
     normal: Floats = gap(placed(pair.a), placed(pair.b))[1][0]
     return normal
@@ -160,8 +171,9 @@ def expected_relative(law: Law, bounciness: float, normal: Floats, before: Float
 def impact_error(scene: Scene, law: Law, impact: Impact, step: float) -> float:
     """Largest relative-velocity error just after the impact, as a fraction of the speed before it.
 
-    With friction only the normal component is judged. Against a static, velocity samples straddle this step's gravity: of the readings
-    (gravity before or after the impact) the kindest counts, so that a figure above round-off is the impact's own.
+    With friction only the normal component is judged. Against a static, velocity samples straddle this step's
+    gravity: of the readings (gravity before or after the impact) the kindest counts, so that what is left is the
+    impact's own.
     """
     contact = scene.contact_of(impact.a, impact.b)
     alone = scene.bodies[impact.a].static or scene.bodies[impact.b].static

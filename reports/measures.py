@@ -1,4 +1,6 @@
-"""All measures of one run, from its trajectory, its scene and the truth of its own law: one code path for every contestant."""
+"""All measures of one run, from its trajectory, its scene and the truth of its own law: one code path for every
+contestant.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +9,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from impactbench.reports import conservation
 from impactbench.reports.impacts import Impact, PairHistory, find_impacts, impact_error, pair_histories, restitution
 from impactbench.scenarios.records import Law, Scene
-from impactbench.scenarios.trajectory import State, Trajectory
+from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case, Truth
 
 COMPARED_TIMES = 60
 """Trajectory errors are taken at about this many steps, spread evenly over the run, the last one included."""
 
-UNITS = {"impact_time_error": "s"} | dict.fromkeys(("wall_time", "wall_time_min", "wall_time_low", "wall_time_high"), "s/s")
+TIMES = ("wall_time", "wall_time_min", "wall_time_low", "wall_time_high")
+UNITS = {"impact_time_error": "s"} | dict.fromkeys(TIMES, "s/s")
 """Units of the measures that are not dimensionless."""
 
 
@@ -34,7 +36,8 @@ class Figure:
 
 
 def measure(case: Case, law: Law, trajectory: Trajectory, delay: float = 0.0) -> list[Figure]:
-    """Every figure this run can give; `delay` [s] is how much later than in the truth everything happens (see `shifted`).
+    """Every figure this run can give; `delay` [s] is how much later than in the truth everything happens (see
+    `shifted`).
 
     The trajectory must be finite; a measure without meaning in the scene is absent.
     """
@@ -69,11 +72,11 @@ def _against_truth(scene: Scene, truth: Truth, trajectory: Trajectory, delay: fl
         yield Figure("trajectory_error", math.sqrt(sum(squares) / len(squares)) / scene.length)
 
 
-def _distance(positions: np.ndarray, state: State) -> float:
+def _distance(positions: Floats, state: State) -> float:
     return _largest(positions - state.positions)
 
 
-def _largest(vectors: np.ndarray) -> float:
+def _largest(vectors: Floats) -> float:
     return float(np.linalg.norm(vectors, axis=-1).max())
 
 
@@ -162,7 +165,7 @@ def law_difference(case: Case) -> list[Figure]:
     if not {"doc", "nc"} <= set(case.truths):
         return []
     scene = case.scene
-    doc, newton = (case.truths[law].state(scene.duration) for law in ("doc", "nc"))  # type: ignore[index]
+    doc, newton = case.truths["doc"].state(scene.duration), case.truths["nc"].state(scene.duration)
     if doc is None or newton is None:
         return []
     return [

@@ -35,7 +35,9 @@ def write_text(path: Path, text: str) -> None:
 
 
 def save(document: dict[str, Any], path: Path) -> None:
-    """Write the document as JSON. Numbers are finite by contract: NaN or infinity raises ValueError and leaves the old file alone."""
+    """Write the document as JSON. Numbers are finite by contract: NaN or infinity raises ValueError and leaves the
+    old file alone.
+    """
     write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
@@ -49,12 +51,16 @@ def read(path: Path) -> dict[str, Any]:
         raise ResultsError(f"{path} is not a results file: {error}") from None
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
-        raise ResultsError(f"{path} has results schema {schema!r}, this version reads {SCHEMA}: run `impactbench compare` again")
+        raise ResultsError(
+            f"{path} has results schema {schema!r}, this version reads {SCHEMA}: run `impactbench compare` again"
+        )
     return dict(document)
 
 
 def frame(document: dict[str, Any]) -> pd.DataFrame:
-    """One tidy row per cell and measure; a cell without figures keeps one row with no measure, so that nothing is dropped."""
+    """One tidy row per cell and measure; a cell without figures keeps one row with no measure, so that nothing is
+    dropped.
+    """
     import pandas as pd
 
     cells = pd.DataFrame(document["cells"]).rename_axis("cell").reset_index()

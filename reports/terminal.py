@@ -7,11 +7,10 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-
 from impactbench.adapters import contestants
 from impactbench.scenarios.catalogue import FAMILIES
+from rich.console import Console
+from rich.table import Table
 
 
 def _text(table: Table, width: int = 110) -> str:
@@ -64,10 +63,10 @@ def summary(document: dict[str, Any]) -> str:
 def cell_table(document: dict[str, Any]) -> str:
     """One cell: what it was, what was set, and every measure."""
     cell = document["cells"][0]
-    head = f"{cell['case']}  {cell['contestant']}  law {cell['law']}  model {cell['model']}  step {cell['step_text']} s: {cell['state']}"
+    head = "{case}  {contestant}  law {law}  model {model}  step {step_text} s: {state}".format(**cell)
     if cell["reason"]:
         head += f" ({cell['reason']})"
-    rows = [[row["measure"], f"{row['value']:.6g}", "" if row["unit"] == "1" else row["unit"]] for row in document["rows"]]
+    rows = [[r["measure"], f"{r['value']:.6g}", "" if r["unit"] == "1" else r["unit"]] for r in document["rows"]]
     settings = [[name, str(value)] for name, value in cell["settings"].items()]
     parts = [head]
     if rows:
@@ -83,7 +82,8 @@ def scenario_table() -> str:
         cases = family.cases()
         kinds = {truth.kind for case in cases for truth in case.truths.values()}
         laws = [law for law in ("doc", "nc") if any(law in case.truths for case in cases)]
-        rows.append([family.name, str(len(cases)), " ".join(laws), ", ".join(sorted(kinds)), family.needs, family.question])
+        kind = ", ".join(sorted(kinds))
+        rows.append([family.name, str(len(cases)), " ".join(laws), kind, family.needs, family.question])
     return _table(["scenario", "cases", "laws", "truth", "needs", "question"], rows)
 
 
