@@ -1,0 +1,72 @@
+"""The report as one HTML file that works from disk with the network off.
+
+Verdict, tables and drawn charts stand in the HTML itself; a script that comes with the page only adds to them.
+A rung is one (case, policy, step); its error is that of the worst impact phase.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import vl_convert
+from impactbench.reports.page_data import number, percent, words
+from impactbench.reports.page_view import View
+from markupsafe import Markup
+
+BUDGET = 3_000_000  # bytes of the whole page
+
+
+def write_page(document: dict[str, Any], path: Path | str) -> None:
+    """Write the report; a reader of `path` sees the old page or the new one, never half of it."""
+    target = Path(path)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(render(document))
+        part.chmod(0o644)  # mkstemp's own mode would lock other readers out
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def render(document: dict[str, Any]) -> str:
+    """The page of one results document, embedding as much of its data as fits the budget."""
+    view = View(document)
+    content = view.content()
+    template = environment().get_template("page.html")
+    for note, data in view.embeddable():
+        page = template.render(**content, thinned=[*view.thinned, *note], data=data, bundle=bundle())
+        if len(page.encode()) <= BUDGET:
+            break
+    return page
+
+
+@functools.cache
+def bundle() -> Markup:
+    """Vega, Vega-Lite and Vega-Embed as one script, from the installed vl-convert."""
+    script = str(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"))
+    return Markup(script.replace("</script", "<\\/script"))
+
+
+def environment() -> jinja2.Environment:
+    """Templates with escaping on for every value."""
+    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
+    found = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    found.filters.update(number=number, percent=percent, safe_json=safe_json, words=words, svg=Markup)
+    found.trim_blocks = found.lstrip_blocks = True
+    return found
+
+
+def safe_json(value: Any) -> Markup:
+    """JSON for the inside of a script element: no character is left that could close it or open a comment."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return Markup(text)

@@ -1,0 +1,92 @@
+"""From a results document to the numbers a page shows: rungs, time to a fixed error, convergence order.
+
+A rung is one (case, policy, step); its figures are those of the worst impact phase.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped]
+
+FLOOR = 1e-12  # round-off of a computation in doubles at scene scale: below it no two errors can be told apart
+KEYS = ["case", "policy", "step"]
+
+
+def number(value: float | None) -> str:
+    """Three significant digits; a dash where nothing was measured."""
+    return "–" if value is None or np.isnan(value) else f"{value:.3g}"
+
+
+def percent(value: float) -> str:
+    """A fraction in per cent, three significant digits."""
+    return f"{100 * value:.3g} %"
+
+
+def words(name: str) -> str:
+    """Name of a measure or family as words."""
+    return name.replace("_", " ")
+
+
+def amount(value: float, unit: str) -> str:
+    """An error for a sentence: dimensionless ones in per cent."""
+    return percent(value) if unit == "1" else f"{value:.3g} {unit}"
+
+
+def listing(items: Iterable[Any], limit: int = 6) -> str:
+    """Items in one line, the rest counted."""
+    found = list(dict.fromkeys(str(item) for item in items))
+    more = f" and {len(found) - limit} more" if len(found) > limit else ""
+    return ", ".join(found[:limit]) + more
+
+
+def tidy_cells(document: dict[str, Any]) -> pd.DataFrame:
+    """Cells with the policy each belongs to: contestant, and model and law where a case has several."""
+    columns = ["case", "family", "law", "contestant", "model", "step", "step_text", "phase", "state", "reason"]
+    cells = pd.DataFrame(document["cells"]).reindex(columns=[*columns, "version", "settings"])
+    cells["step"] = pd.to_numeric(cells["step"]).fillna(0.0)  # 0: moves from event to event
+    cells[["step_text", "reason"]] = cells[["step_text", "reason"]].fillna("").astype(str)
+    cells["state"] = cells["state"].fillna("error")
+    several = cells.groupby("case")["law"].transform("nunique") > 1
+    cells["policy"] = cells["contestant"].astype(str)
+    full = cells["model"] != "minimal"
+    cells.loc[full, "policy"] += " · " + cells.loc[full, "model"].astype(str)
+    cells.loc[several, "policy"] += " · " + cells.loc[several, "law"].astype(str)
+    return cells
+
+
+def tidy_rungs(cells: pd.DataFrame, rows: list[dict[str, Any]]) -> pd.DataFrame:
+    """One line a rung, one column a measure: the worst phase's value, sign kept; a rung with a bad phase is bad."""
+    values = pd.DataFrame(rows).reindex(columns=["cell", "measure", "value"]).dropna()
+    values = values.join(cells[KEYS], on="cell")
+    values["size"] = pd.to_numeric(values["value"]).abs()
+    worst = values.sort_values("size").drop_duplicates([*KEYS, "measure"], keep="last")
+    wide = worst.pivot(index=KEYS, columns="measure", values="value").astype(float)
+    bad = cells.assign(bad=cells["state"] != "ok").sort_values("bad", kind="stable")
+    return bad.drop_duplicates(KEYS, keep="last").join(wide, on=KEYS).drop(columns="bad")
+
+
+def time_to(line: pd.DataFrame, target: float) -> pd.Series | None:
+    """Cheapest rung that meets the target together with every finer one; no credit for a lucky step."""
+    met = []
+    for _, rung in line.sort_values("step").iterrows():
+        if rung["state"] != "ok" or not rung["error"] <= target:
+            break
+        met.append(rung)
+    timed = [rung for rung in met if not np.isnan(rung["cost"])]
+    return min(timed, key=lambda rung: float(rung["cost"])) if timed else None
+
+
+def order(line: pd.DataFrame) -> dict[str, Any] | None:
+    """Least-squares slope of log error against log step on the four finest rungs that stand above round-off."""
+    usable = line[(line["state"] == "ok") & (line["step"] > 0) & (line["error"] > 100 * FLOOR)]
+    usable = usable.sort_values("step").head(4)
+    if len(usable) < 3:
+        return None
+    x, y = np.log(usable["step"].to_numpy(float)), np.log(usable["error"].to_numpy(float))
+    slope = float(np.polyfit(x, y, 1)[0])
+    spread = float(np.std(x) * np.std(y))
+    r2 = float(np.mean((x - x.mean()) * (y - y.mean())) / spread) ** 2 if spread > 0 else 0.0
+    return {"slope": slope, "r2": r2, "rungs": listing(usable["step_text"])}
