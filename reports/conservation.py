@@ -128,7 +128,7 @@ def energies(scene: Scene, trajectory: Trajectory) -> Floats:
 
 
 def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
-    """What to add to `energies` so that positions and velocities belong to one instant [J], shape [T].
+    """What to add to `energies` so that positions and velocities belong to one instant [J], shape [T]; 0 at the start.
 
     In free flight a step moves a body by h (alpha v + (1 - alpha) v'): alpha is 0 where velocity goes first, 1 where
     position does, 1/2 for an exact parabola. Such a scheme keeps E + (1/2 - alpha) h m g . v. alpha is measured
@@ -148,4 +148,5 @@ def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
     alpha = float(np.median(late[free])) if free.any() else 0.5
     step = np.concatenate([steps[:1], steps])
     power = np.einsum("n,tni,i->t", masses(scene), trajectory.velocities, gravity)
-    return np.asarray((0.5 - alpha) * step * power)
+    offset = (0.5 - alpha) * step * power
+    return np.asarray(offset - offset[0])

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
-from impactbench.scenarios import flight, pairs, walls
+from impactbench.scenarios import flight, gravity_drops, lines, pairs, sliding, walls
 from impactbench.scenarios.truth import Case, Family
 
 FAMILIES: dict[str, Family] = {
@@ -16,6 +16,9 @@ FAMILIES: dict[str, Family] = {
         *flight.FAMILIES,
         *pairs.FAMILIES,
         *walls.FAMILIES,
+        *gravity_drops.FAMILIES,
+        *lines.FAMILIES,
+        *sliding.FAMILIES,
     )
 }
 
