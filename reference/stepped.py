@@ -1,0 +1,188 @@
+"""The stepped runner for particles (documents, rules R3 and R4): detect, impacts, gravity, lasting contacts, move,
+keep apart.
+
+Choices that the documents leave open, made so that energy never grows:
+- Positions move by the mean of the velocities before and after the step's forces: free flight is the exact parabola.
+- A body found d deep in a static one is lifted by d and its approach reduced to the speed it had when it touched
+  (`penetration.touching_speed`), so the lift adds nothing. What a slower body cannot pay of m a d is kept as its debt
+  and taken from the next approach: the energy never exceeds its start by more than the debt.
+- A contact slower than gravity explains is lasting: 2 h |g . n|, since gravity does not push bodies sideways.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from impactbench.reference.compiled import compiled
+from impactbench.reference.gaps import locate
+from impactbench.reference.particles import Bodies, Indices, Pairs
+from impactbench.reference.responses import damp, exchange, hold, relative, resolve_impacts
+from impactbench.scenarios.trajectory import Floats
+
+SWEEPS = 5000
+IMPACT_SWEEPS = 200
+
+
+class Rules(NamedTuple):
+    """How to step: `step` [s], `gravity` [m/s^2], `carried` 1 on the axes that carry motion else 0, the law and the
+    strategy of R4.
+
+    touch [m]: gap up to which bodies touch. still [m/s]: a speed that counts as none. Both are round-off next to the
+    scene.
+    """
+
+    step: float
+    gravity: Floats
+    carried: Floats
+    doc: bool
+    revert: bool
+    touch: float
+    still: float
+
+
+@compiled
+def run(bodies: Bodies, pairs: Pairs, rules: Rules, steps: int) -> int:
+    """Advance by `steps`. Returns how many were done: fewer if lasting contacts found no common solution in
+    `SWEEPS`.
+    """
+    for done in range(steps):
+        if not one_step(bodies, pairs, rules):
+            return done
+    return steps
+
+
+@compiled
+def start(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
+    """Contacts that touch at t = 0 are lasting ones (documents, rule R3)."""
+    detect(bodies, pairs, rules.touch)
+    pairs.touched[:] = pairs.touching
+
+
+@compiled
+def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
+    active = detect(bodies, pairs, rules.touch)
+    slow = slow_approach(pairs, active, rules)
+    for p in active:
+        pairs.touched[p] |= relative(bodies, pairs, p)[0] >= -slow[p]
+    resolve_impacts(bodies, pairs, active, slow, rules.doc, IMPACT_SWEEPS)
+
+    # Lasting contacts carry no approach into the step; what they pushed here is no part of the step's weight.
+    weight = pairs.push.copy()
+    pairs.push[:] = 0.0
+    settled = hold(bodies, pairs, active, False, rules.still, SWEEPS)
+    pairs.push[:] = np.where(pairs.touching, weight, 0.0)
+    before, last = bodies.velocity.copy(), bodies.position.copy()
+    for i in range(len(bodies.inverse_mass)):
+        if bodies.inverse_mass[i] > 0:
+            bodies.velocity[i] += rules.step * rules.gravity
+    settled &= hold(bodies, pairs, active, not rules.doc, rules.still, SWEEPS)
+    if rules.doc:
+        damp(bodies, pairs, active, rules.step, rules.still)
+
+    bodies.velocity[:] *= rules.carried
+    bodies.position[:] += rules.step / 2 * (before + bodies.velocity) * rules.carried
+    pairs.touched[:] = pairs.touching
+    if rules.revert:
+        revert(bodies, pairs, rules, last, before, slow)
+    else:
+        project(bodies, pairs, rules)
+    return settled
+
+
+@compiled
+def detect(bodies: Bodies, pairs: Pairs, touch: float) -> Indices:
+    """Numbers of the pairs that touch now."""
+    for p in range(len(pairs.first)):
+        locate(bodies, pairs, p)
+        pairs.touching[p] = pairs.gap[p] <= pairs.reach[p] + touch
+        if not pairs.touching[p]:
+            pairs.reach[p] = 0.0
+    return np.nonzero(pairs.touching)[0]
+
+
+@compiled
+def slow_approach(pairs: Pairs, active: Indices, rules: Rules) -> Floats:
+    """Approach speed [m/s] per pair that gravity along its normal alone explains, 2 h |g . n|."""
+    slow = np.zeros(len(pairs.first))
+    for p in active:
+        n, g = pairs.normal[p], rules.gravity
+        slow[p] = max(rules.still, 2 * rules.step * abs(g[0] * n[0] + g[1] * n[1] + g[2] * n[2]))
+    return slow
+
+
+@compiled
+def project(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
+    """Move overlapping bodies apart, shared by mass (documents, rule R4), pair after pair until no overlap is left.
+
+    A heap that needs more than `SWEEPS` keeps its rest of overlap for the next step.
+    """
+    for sweep in range(SWEEPS):
+        clear = True
+        for i in range(len(pairs.first)):
+            p = i if sweep % 2 == 0 else len(pairs.first) - 1 - i
+            locate(bodies, pairs, p)
+            if pairs.gap[p] < -rules.touch / 2:
+                part(bodies, pairs, p, rules.gravity)
+                clear = False
+        if clear:
+            return
+
+
+@compiled
+def part(bodies: Bodies, pairs: Pairs, p: int, gravity: Floats) -> None:
+    """Take pair p apart along its normal and let its approach pay for what that adds to the energy.
+
+    The common centre of two movable bodies stays, which costs nothing; a lift off a static body costs m a d. What the
+    approach cannot pay waits on the upper body for a contact that can: in a column, the blow comes from above.
+    """
+    a, b, n, depth = pairs.first[p], pairs.second[p], pairs.normal[p], -pairs.gap[p]
+    w_a, w_b = bodies.inverse_mass[a], bodies.inverse_mass[b]
+    for k in range(3):
+        bodies.position[a, k] -= depth * w_a / (w_a + w_b) * n[k]
+        bodies.position[b, k] += depth * w_b / (w_a + w_b) * n[k]
+    pull = -(gravity[0] * n[0] + gravity[1] * n[1] + gravity[2] * n[2])
+    cost = bodies.debt[a] + bodies.debt[b]
+    if w_a == 0:
+        cost += pull * depth / w_b
+    approach, mass = max(0.0, -relative(bodies, pairs, p)[0]), 1 / (w_a + w_b)
+    if cost == 0:
+        return
+    touched = math.sqrt(max(0.0, approach * approach - 2 * cost / mass)) if approach > 0 else 0.0
+    blow = mass * (approach - touched)
+    exchange(bodies, pairs, p, blow * n[0], blow * n[1], blow * n[2])
+    upper = b if w_a == 0 or pull > 0 else a
+    bodies.debt[a] = bodies.debt[b] = 0.0
+    bodies.debt[upper] = max(0.0, cost - mass * (approach * approach - touched * touched) / 2)
+
+
+@compiled
+def revert(bodies: Bodies, pairs: Pairs, rules: Rules, last: Floats, before: Floats, slow: Floats) -> None:
+    """Put overlapping bodies back to where the step began, with the velocity they had there (documents, rule R4).
+
+    A body put back may now be in another's way, which goes back as well; at most every body does. Pairs that
+    overlapped count as touching across the gap that is left, so that the next step treats their contact; after that
+    only across a gap of 2 g h^2, so that a body held further off falls on.
+    """
+    back = np.zeros(len(bodies.inverse_mass), dtype=np.bool_)
+    met = np.zeros(len(pairs.first), dtype=np.bool_)
+    for _ in range(len(back) + 1):
+        clear = True
+        for p in range(len(pairs.first)):
+            locate(bodies, pairs, p)
+            a, b = pairs.first[p], pairs.second[p]
+            if pairs.gap[p] < -rules.touch / 2 and not (back[b] and (back[a] or bodies.inverse_mass[a] == 0)):
+                for i in (a, b):
+                    back[i] = True
+                    bodies.position[i] = last[i]
+                    bodies.velocity[i] = before[i]
+                met[p] = True
+                clear = False
+        if clear:
+            break
+    for p in range(len(met)):
+        pairs.reach[p] = min(pairs.reach[p], rules.step * slow[p])
+        if met[p]:
+            locate(bodies, pairs, p)
+            pairs.reach[p] = max(0.0, pairs.gap[p])
