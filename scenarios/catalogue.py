@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
-from impactbench.scenarios import flight, gravity_drops, lines, pairs, sliding, walls
+from impactbench.scenarios import flight, gravity_drops, lines, pairs, rigid, rolling, sliding, walls
 from impactbench.scenarios.truth import Case, Family
 
 FAMILIES: dict[str, Family] = {
@@ -19,6 +19,8 @@ FAMILIES: dict[str, Family] = {
         *gravity_drops.FAMILIES,
         *lines.FAMILIES,
         *sliding.FAMILIES,
+        *rolling.FAMILIES,
+        *rigid.FAMILIES,
     )
 }
 

@@ -1,9 +1,8 @@
 """The two impact laws of point-like bodies, as the truths use them: pure functions of numbers.
 
 Both are written through the centre-of-mass velocity V and the relative velocity u = v_B - v_A, because an impact keeps
-V (R6)
-and only maps u to u'. Then v_A' = V - (m_B/M) u' and v_B' = V + (m_A/M) u', with M = m_A + m_B.
-An infinite mass is a static body (R13).
+V (R6) and only maps u to u'. Then v_A' = V - (m_B/M) u' and v_B' = V + (m_A/M) u', with M = m_A + m_B. An infinite mass
+is a static body (R13).
 """
 
 from __future__ import annotations
@@ -19,8 +18,7 @@ Pair: TypeAlias = tuple[Floats, Floats]
 
 
 def doc_relative(u: Floats, normal: Floats, b: float) -> Floats:
-    """u' = b (u - 2 (u.n) n) (R9): the elastic impact mirrors u at the contact plane (R7), the inelastic one leaves
-    none (R8)."""
+    """u' = b (u - 2 (u.n) n) (R9): the elastic impact mirrors u at the contact plane (R7), R8 leaves none."""
     mirrored: Floats = u - 2 * (u @ normal) * normal
     return b * mirrored
 

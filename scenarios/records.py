@@ -1,8 +1,7 @@
 """What a scene is: bodies, shapes, coefficients of pairs and the smallest model that can show the effect.
 
 Records are plain immutable data in SI units (m, kg, s, rad). They know nothing of engines.
-Vectors are tuples of three floats, so that
-scenes compare, hash and serialise exactly; engines turn them into arrays once.
+Vectors are tuples of three floats, so that scenes compare, hash and serialise exactly; engines turn them into arrays.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from typing import Literal
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Law = Literal["doc", "nc"]
-"""`doc`: the documents' law (R5 viscous friction, R9 impacts). `nc`: Newton restitution e on the normal, Coulomb
-friction mu."""
+"""`doc`: the documents' law (R5 viscous friction, R9 impacts).
+`nc`: Newton restitution e on the normal, Coulomb friction mu."""
 
 ZERO: Vector = (0.0, 0.0, 0.0)
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
