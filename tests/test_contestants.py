@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from impactbench.adapters.contestants import CONTESTANTS, Contestant, UnknownContestant, _why_missing, select
 from impactbench.scenarios.engine import Unavailable
 
@@ -53,7 +52,7 @@ def test_own_engine_from_a_file(tmp_path: Path):
     (own,) = select([f"{path}:Fake"], ["tuned"])
     assert (own.name, own.version(), own.availability(), own.law) == ("Fake/default", None, "", "nc")
     assert pickle.loads(pickle.dumps(own)).load().settings == {"own": 1}
-    with pytest.raises(Unavailable, match="Other/default cannot be loaded: .*Other"):
+    with pytest.raises(Unavailable, match=r"Other/default cannot be loaded: .*Other"):
         select([f"{path}:Other"])[0].load()
 
 
