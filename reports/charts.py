@@ -6,6 +6,7 @@ turned back into data values, so that one pair of logarithmic scales carries the
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -14,14 +15,15 @@ from typing import Any
 import altair as alt
 import pandas as pd  # type: ignore[import-untyped]
 import vl_convert
-from impactbench.reports.page_data import FLOOR
+from impactbench.reports.page_data import FLOOR, isolated
 
 # Okabe and Ito's palette without yellow (illegible on white) and black (illegible on a dark page).
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C")
 # Eight shapes against seven colours: 56 policies before a pair repeats.
-SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-right", "stroke")
-WIDTH, HEIGHT = 780, 340
+SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-right", "triangle-left")
+WIDTH, HEIGHT = 780, 290
 FLOOR_RAIL, FAIL_RAIL, LINE = 54, 210, 13  # pixels
+Box = tuple[float, float, float, float]  # left, top, right, bottom in pixels
 INK = "currentColor"  # follows the page, in its light and its dark scheme
 
 
@@ -66,7 +68,7 @@ def span(values: list[float], pad: float) -> tuple[float, float]:
 
 def short(text: str, length: int = 26) -> str:
     """Label for a chart, cut where it would run over its neighbours; tables show names whole."""
-    return text if len(text) <= length else text[: length - 1] + "…"
+    return isolated(text if len(text) <= length else text[: length - 1] + "…")
 
 
 def pareto(points: pd.DataFrame) -> pd.DataFrame:
@@ -79,27 +81,37 @@ def pareto(points: pd.DataFrame) -> pd.DataFrame:
     return points.loc[keep]
 
 
-def place(wanted: list[tuple[float, float, str]], taken: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Give every label (x, y, text) a free spot near its point: greedy, at most 24 lines away, else where it began."""
-    boxes = [(x - 5, y - 5, x + 5, y + 5) for x, y in taken]
+def place(wanted: list[tuple[float, float, str]], taken: list[Box], right: float) -> list[tuple[float, float]]:
+    """Give every label (x, y, text) a free spot near its point, left edge and middle line: greedy, at most 12 lines
+    up or down on either side, else where it began.
+    """
+    boxes = list(taken)
     spots = []
     for x, y, text in wanted:
-        width = 6.3 * len(text)
-        left = min(x + 9, WIDTH - width)
+        width = 6.4 * len(text)
+        options = []
         for step in range(24):
-            dy = (step + 1) // 2 * LINE * (-1 if step % 2 else 1)
-            top = y + dy - LINE / 2
-            box = (left, top, left + width, top + LINE)
-            if 0 <= top <= HEIGHT - LINE and not any(overlap(box, other) for other in boxes):
-                break
-        else:
-            box = (left, y - LINE / 2, left + width, y + LINE / 2)
+            top = y + (step + 1) // 2 * LINE * (-1 if step % 2 else 1) - LINE / 2
+            options += [(left, top, left + width, top + LINE) for left in (x + 9, x - 9 - width)]
+        inside = [o for o in options if o[0] > FLOOR_RAIL / 2 and o[2] < right and 0 <= o[1] <= HEIGHT - LINE]
+        free = [option for option in inside if not any(overlap(option, box) for box in boxes)]
+        box = (free or inside or options)[0]
         boxes.append(box)
-        spots.append((left, box[1] + LINE / 2))
+        spots.append((box[0], box[1] + LINE / 2))
     return spots
 
 
-def overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> bool:
+def obstacles(line: list[tuple[float, float]]) -> list[Box]:
+    """Boxes around a curve's points and around places between them, for labels to keep clear of."""
+    boxes = [(x - 6, y - 6, x + 6, y + 6) for x, y in line]
+    for (x0, y0), (x1, y1) in itertools.pairwise(line):
+        for part in (0.2, 0.4, 0.6, 0.8):
+            x, y = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
+            boxes.append((x - 2, y - 2, x + 2, y + 2))
+    return boxes
+
+
+def overlap(a: Box, b: Box) -> bool:
     """Whether two boxes (left, top, right, bottom) share area."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
@@ -135,7 +147,9 @@ def frame_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def work_precision(points: pd.DataFrame, failed: pd.DataFrame, style: Style, titles: tuple[str, str]) -> alt.LayerChart:
+def work_precision(
+    points: pd.DataFrame, failed: pd.DataFrame, style: Style, titles: tuple[str, str]
+) -> alt.LayerChart | alt.FacetChart:
     """Cost against error, one line a policy in order of step.
 
     `points` has policy, engine, step, step_text, error, cost, low, high; `failed` has policy, engine, state, reason,
@@ -219,20 +233,23 @@ def curves(points: pd.DataFrame, style: Style) -> list[alt.Chart]:
 def labels(points: pd.DataFrame, spots: list[tuple[float, float]], axes: Axes) -> list[alt.Chart]:
     """Policy and finest step at each line's fine end, the coarsest step at the other."""
     numbered = points.assign(row=range(len(points)))
-    wanted = []
+    wanted: list[tuple[float, float, str]] = []
+    taken: list[Box] = []
     for policy, line in numbered.groupby("policy", sort=False):
         ordered = line.sort_values("step")
+        taken += obstacles([spots[int(row)] for row in ordered["row"]])
         name = f"{short(str(policy))}  {ordered.iloc[0]['step_text']}".rstrip()
         wanted.append((*spots[int(ordered.iloc[0]["row"])], name))
         if len(ordered) > 1:
             wanted.append((*spots[int(ordered.iloc[-1]["row"])], str(ordered.iloc[-1]["step_text"])))
     wanted.sort(key=lambda item: -len(item[2]))  # names first: they are the ones that must stay close
-    placed = place(wanted, spots)
+    placed = place(wanted, taken, WIDTH - axes.fail)
     texts, leaders = [], []
     for (x, y, text), (left, middle) in zip(wanted, placed, strict=True):
         texts.append({"x": axes.at_x(left), "y": axes.at_y(middle), "t": text})
+        near = left if left > x else left + 6.4 * len(text)
         if abs(middle - y) > LINE:  # moved aside: say which point it belongs to
-            ends = {"x2": axes.at_x(left - 1), "y2": axes.at_y(middle)}
+            ends = {"x2": axes.at_x(near), "y2": axes.at_y(middle)}
             leaders.append({"x": axes.at_x(x), "y": axes.at_y(y), **ends})
     found = [alt.Chart(frame_of(texts)).mark_text(align="left", fontSize=11, baseline="middle").encode(text="t:N")]
     if leaders:

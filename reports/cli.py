@@ -59,11 +59,15 @@ def _steps(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple
     return tuple(dict.fromkeys(texts))
 
 
-def _contestants(engines: Sequence[str], profile: str) -> list[Contestant]:
+def _contestants(engines: Sequence[str], profile: str) -> Sequence[Contestant]:
+    """An engine named with its profile needs no `--profile`; the reference has one profile, which always passes."""
     from impactbench.adapters import contestants
 
+    whole = [name for name in engines if "/" in name]
     try:
-        return contestants.select(engines, None if profile == "both" else profile)
+        if whole and len(whole) == len(engines):
+            return contestants.select(engines)
+        return contestants.select(engines, () if profile == "both" else (profile, "stepped"))
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 

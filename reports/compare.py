@@ -64,7 +64,7 @@ def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:
     no choice.
     """
     laws = case.scene.laws
-    wanted = asked if asked and contestant.chooses_law else contestant.law
+    wanted = asked if asked and contestant.law == "doc" else contestant.law
     return wanted if wanted in laws else laws[0]
 
 
@@ -104,7 +104,7 @@ def accuracy_lane(cells: Sequence[Entry], jobs: int, progress: Progress) -> dict
         if contestant.name in missing:
             outcomes[cell.key] = {"state": "unavailable", "reason": missing[contestant.name]}
     work = [
-        Job(cell.key, contestant.engine, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
+        Job(cell.key, contestant.lane, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
         for cell, contestant in cells
         if contestant.name not in missing
     ]

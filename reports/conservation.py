@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from impactbench.reports.geometry import rotation_matrices
-from impactbench.reports.impacts import Impact, PairHistory
+from impactbench.reports.impacts import Impact, PairHistory, flight_fraction
 from impactbench.scenarios.records import Law, Scene
 from impactbench.scenarios.trajectory import Floats, Trajectory
 
@@ -130,23 +130,10 @@ def energies(scene: Scene, trajectory: Trajectory) -> Floats:
 def matched_offset(scene: Scene, trajectory: Trajectory) -> Floats:
     """What to add to `energies` so that positions and velocities belong to one instant [J], shape [T]; 0 at the start.
 
-    In free flight a step moves a body by h (alpha v + (1 - alpha) v'): alpha is 0 where velocity goes first, 1 where
-    position does, 1/2 for an exact parabola. Such a scheme keeps E + (1/2 - alpha) h m g . v. alpha is measured
-    from the steps in which the velocity changed by g h and nothing else; a run without such a step needs no
-    correction.
+    A scheme that spends the fraction f of a step with the old velocity keeps E + (1/2 - f) h m g . v in free flight.
     """
-    gravity = np.array(scene.gravity)
-    weight2 = float(gravity @ gravity)
     steps = np.diff(trajectory.times)
-    if weight2 == 0 or len(steps) == 0:
-        return np.zeros(len(trajectory.times))
-    change = np.diff(trajectory.velocities, axis=0)
-    fall = gravity * steps[:, None]
-    free = np.linalg.norm(change - fall[:, None], axis=2) <= 1e-6 * np.linalg.norm(fall, axis=1)[:, None]
-    lag = np.diff(trajectory.positions, axis=0) / steps[:, None, None] - trajectory.velocities[1:]
-    late = lag @ gravity / (-weight2 * steps[:, None])
-    alpha = float(np.median(late[free])) if free.any() else 0.5
     step = np.concatenate([steps[:1], steps])
-    power = np.einsum("n,tni,i->t", masses(scene), trajectory.velocities, gravity)
-    offset = (0.5 - alpha) * step * power
+    power = np.einsum("n,tni,i->t", masses(scene), trajectory.velocities, np.array(scene.gravity))
+    offset = (0.5 - flight_fraction(scene, trajectory)) * step * power
     return np.asarray(offset - offset[0])

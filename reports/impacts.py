@@ -38,7 +38,10 @@ class PairHistory:
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """One isolated impact of a pair: time [s], unit normal, relative velocity before and after [m/s]."""
+    """One isolated impact of a pair: time [s], unit normal, relative velocity before and after [m/s].
+
+    alpha: its place in its step; earliest: nothing in the scene touched before.
+    """
 
     a: int
     b: int
@@ -46,7 +49,9 @@ class Impact:
     normal: Floats
     before: Floats
     after: Floats
+    alpha: float
     last_step: int
+    earliest: bool
 
 
 def pair_histories(scene: Scene, trajectory: Trajectory) -> list[PairHistory]:
@@ -80,6 +85,9 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
     for pair, flags in zip(pairs, active, strict=True):
         for index in (pair.a, pair.b):
             busy[index] += flags
+    # Free flight first: the integrator's own share of a displacement must not be read as an impact's place in the step.
+    flight = flight_fraction(scene, trajectory)
+    first_touch = min((int(np.argmax(flags)) for flags in active if flags.any()), default=0)
     found = []
     for pair, flags in zip(pairs, active, strict=True):
         movable = [index for index in (pair.a, pair.b) if not scene.bodies[index].static]
@@ -88,7 +96,11 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
             alone = all((busy[index][first : last + 1] == 1).all() for index in movable)
             settled = last + 1 < len(steps) or first == last
             if alone and settled and closing > 2 * weight * steps[first]:
-                found.append(_impact(scene, trajectory, pair, first, last))
+                alpha = _fraction(scene, trajectory, pair, first, flight) if first == last else 0.0
+                normal = _normal_at(scene, trajectory, pair, first, alpha)
+                time = float(trajectory.times[first] + alpha * steps[first])
+                before, after = pair.relative[first], pair.relative[last + 1]
+                found.append(Impact(pair.a, pair.b, time, normal, before, after, alpha, last, first == first_touch))
     return sorted(found, key=lambda impact: impact.time)
 
 
@@ -111,27 +123,37 @@ def _episodes(flags: Flags) -> Iterator[tuple[int, int]]:
     yield from ((int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2))
 
 
-def _impact(scene: Scene, trajectory: Trajectory, pair: PairHistory, first: int, last: int) -> Impact:
-    step = trajectory.times[first + 1] - trajectory.times[first]
-    alpha = _fraction(scene, trajectory, pair, first, step) if first == last else 0.0
-    return Impact(
-        pair.a,
-        pair.b,
-        float(trajectory.times[first] + alpha * step),
-        _normal_at(scene, trajectory, pair, first, alpha),
-        pair.relative[first],
-        pair.relative[last + 1],
-        last,
-    )
+def flight_fraction(scene: Scene, trajectory: Trajectory) -> float:
+    """Fraction of a step that free flight spends with the old velocity: 0 velocity first, 1 position first.
+
+    1/2 is a parabola. Measured from the steps in which a velocity changed by g h alone; 1/2 where there is none.
+    """
+    gravity = np.array(scene.gravity)
+    weight2 = float(gravity @ gravity)
+    steps = np.diff(trajectory.times)
+    if weight2 == 0 or len(steps) == 0:
+        return 0.5
+    fall = gravity * steps[:, None]
+    change = np.diff(trajectory.velocities, axis=0)
+    free = np.linalg.norm(change - fall[:, None], axis=2) <= 1e-6 * np.linalg.norm(fall, axis=1)[:, None]
+    lag = np.diff(trajectory.positions, axis=0) / steps[:, None, None] - trajectory.velocities[1:]
+    late = lag @ gravity / (-weight2 * steps[:, None])
+    return float(np.median(late[free])) if free.any() else 0.5
 
 
-def _fraction(scene: Scene, trajectory: Trajectory, pair: PairHistory, k: int, step: float) -> float:
-    """Fraction of the step before the impact, from the displacement of the body whose velocity jumped most."""
+def _fraction(scene: Scene, trajectory: Trajectory, pair: PairHistory, k: int, flight: float) -> float:
+    """Fraction of the step before the impact, from the displacement of the body whose velocity jumped most.
+
+    With old and new velocity v and v', and the fraction f of free flight,
+    x' - x = tau v + (h - tau) v' + (tau - f h) g h.
+    """
+    step = float(trajectory.times[k + 1] - trajectory.times[k])
+    fall = np.array(scene.gravity) * step
     rows = [scene.movable.index(index) for index in (pair.a, pair.b) if not scene.bodies[index].static]
-    jumps = [trajectory.velocities[k, row] - trajectory.velocities[k + 1, row] for row in rows]
+    jumps = [trajectory.velocities[k, row] - trajectory.velocities[k + 1, row] + fall for row in rows]
     row, jump = max(zip(rows, jumps, strict=True), key=lambda item: float(item[1] @ item[1]))
     moved = (trajectory.positions[k + 1, row] - trajectory.positions[k, row]) / step - trajectory.velocities[k + 1, row]
-    return float(np.clip(moved @ jump / (jump @ jump), 0.0, 1.0))
+    return float(np.clip((moved + flight * fall) @ jump / (jump @ jump), 0.0, 1.0))
 
 
 def _normal_at(scene: Scene, trajectory: Trajectory, pair: PairHistory, k: int, alpha: float) -> Floats:
@@ -172,7 +194,7 @@ def impact_error(scene: Scene, law: Law, impact: Impact, step: float) -> float:
     """Largest relative-velocity error just after the impact, as a fraction of the speed before it.
 
     With friction only the normal component is judged. Against a static, velocity samples straddle this step's
-    gravity: of the readings (gravity before or after the impact) the kindest counts, so that what is left is the
+    gravity: of the readings (gravity before, at or after the impact) the kindest counts, so that what is left is the
     impact's own.
     """
     contact = scene.contact_of(impact.a, impact.b)
@@ -186,7 +208,7 @@ def impact_error(scene: Scene, law: Law, impact: Impact, step: float) -> float:
         miss = after - expected_relative(law, contact.bounciness, impact.normal, before)
         return abs(float(miss @ impact.normal)) if frictional else float(np.linalg.norm(miss))
 
-    return min(error(x, y) for x, y in product((0.0, 1.0), repeat=2)) / scale
+    return min(error(x, y) for x, y in product((0.0, 1.0, impact.alpha), (0.0, 1.0, 1 - impact.alpha))) / scale
 
 
 def restitution(impact: Impact) -> float:

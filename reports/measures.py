@@ -146,7 +146,7 @@ def _at_impacts(
         measured = restitution(first)
         yield Figure("restitution_measured", measured)
         yield Figure("restitution_error", measured - scene.contact_of(first.a, first.b).bounciness)
-    if truth.impact_times:
+    if truth.impact_times and impacts[0].earliest:
         yield Figure("impact_time_error", impacts[0].time - delay - truth.impact_times[0])
 
 

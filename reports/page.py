@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import functools
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import vl_convert
+from impactbench.reports import results
 from impactbench.reports.page_data import number, percent, words
 from impactbench.reports.page_view import View
 from markupsafe import Markup
@@ -24,16 +23,7 @@ BUDGET = 3_000_000  # bytes of the whole page
 
 def write_page(document: dict[str, Any], path: Path | str) -> None:
     """Write the report; a reader of `path` sees the old page or the new one, never half of it."""
-    target = Path(path)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(render(document))
-        part.chmod(0o644)  # mkstemp's own mode would lock other readers out
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
+    results.write_text(Path(path), render(document))
 
 
 def render(document: dict[str, Any]) -> str:

@@ -22,7 +22,12 @@ def number(value: float | None) -> str:
 
 def percent(value: float) -> str:
     """A fraction in per cent, three significant digits."""
-    return f"{100 * value:.3g} %"
+    return f"{100 * value:.3g} %".replace("-", "−", 1) if value < 0 else f"{100 * value:.3g} %"
+
+
+def isolated(name: str) -> str:
+    """Name that cannot turn the direction of the text around it; most names need nothing."""
+    return name if name.isascii() else f"\u2068{name}\u2069"
 
 
 def words(name: str) -> str:
@@ -37,19 +42,19 @@ def amount(value: float, unit: str) -> str:
 
 def listing(items: Iterable[Any], limit: int = 6) -> str:
     """Items in one line, the rest counted."""
-    found = list(dict.fromkeys(str(item) for item in items))
+    found = list(dict.fromkeys(isolated(str(item)) for item in items))
     more = f" and {len(found) - limit} more" if len(found) > limit else ""
     return ", ".join(found[:limit]) + more
 
 
 def tidy_cells(document: dict[str, Any]) -> pd.DataFrame:
-    """Cells with the policy each belongs to: contestant, and model and law where a case has several."""
+    """Cells with the policy each belongs to: contestant, and model and law where it ran several."""
     columns = ["case", "family", "law", "contestant", "model", "step", "step_text", "phase", "state", "reason"]
     cells = pd.DataFrame(document["cells"]).reindex(columns=[*columns, "version", "settings"])
     cells["step"] = pd.to_numeric(cells["step"]).fillna(0.0)  # 0: moves from event to event
     cells[["step_text", "reason"]] = cells[["step_text", "reason"]].fillna("").astype(str)
     cells["state"] = cells["state"].fillna("error")
-    several = cells.groupby("case")["law"].transform("nunique") > 1
+    several = cells.groupby(["case", "contestant"])["law"].transform("nunique") > 1
     cells["policy"] = cells["contestant"].astype(str)
     full = cells["model"] != "minimal"
     cells.loc[full, "policy"] += " · " + cells.loc[full, "model"].astype(str)

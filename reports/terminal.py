@@ -89,7 +89,7 @@ def scenario_table() -> str:
 
 def engine_table() -> str:
     rows = []
-    for contestant in contestants.CONTESTANTS.values():
+    for contestant in contestants.CONTESTANTS:
         why = contestant.availability()
         rows.append([contestant.name, contestant.version() or "-", why or "available"])
     return _table(["contestant", "version", "here"], rows)
