@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import altair as alt
-import pandas as pd  # type: ignore[import-untyped]
+import pandas as pd
 import vl_convert
 from impactbench.reports.page_data import FLOOR, isolated
 

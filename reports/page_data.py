@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import pandas as pd  # type: ignore[import-untyped]
+import pandas as pd
 
 FLOOR = 1e-12  # round-off of a computation in doubles at scene scale: below it no two errors can be told apart
 KEYS = ["case", "policy", "step"]
@@ -28,6 +28,11 @@ def percent(value: float) -> str:
 def isolated(name: str) -> str:
     """Name that cannot turn the direction of the text around it; most names need nothing."""
     return name if name.isascii() else f"\u2068{name}\u2069"
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def words(name: str) -> str:

@@ -6,10 +6,12 @@ import json
 from typing import Any
 
 import numpy as np
-import pandas as pd  # type: ignore[import-untyped]
+import pandas as pd
 from impactbench.reports import charts
 from impactbench.reports.page_data import (
     amount,
+    counted,
+    isolated,
     listing,
     number,
     order,
@@ -108,10 +110,9 @@ class View:
         other = ", ".join(f"{n} {state}" for state, n in states.items() if state != "ok")
         steps = self.cells[self.cells["step"] > 0].sort_values("step", ascending=False)["step_text"].drop_duplicates()
         ladder = f" at {len(steps)} step sizes ({steps.iloc[0]} to {steps.iloc[-1]} s)" if len(steps) else ""
-        return (
-            f"{self.cells['contestant'].nunique()} contestants were compared on {len(self.cases)} cases{ladder}: "
-            f"{states.get('ok', 0)} of {len(self.cells)} cells ran" + (f"; {other}." if other else ".")
-        )
+        who, cases = counted(self.cells["contestant"].nunique(), "contestant"), counted(len(self.cases), "case")
+        ran = f"{states.get('ok', 0)} of {counted(len(self.cells), 'cell')} ran"
+        return f"{who} compared on {cases}{ladder}: {ran}" + (f"; {other}." if other else ".")
 
     def worst(self) -> list[str]:
         """The largest energy gain and loss, and the largest headline error at a policy's own finest step."""
@@ -133,7 +134,7 @@ class View:
     def finding(self, rung: pd.Series, what: str) -> str:
         """One worst case with where it was seen."""
         at = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
-        return f"{rung['policy']} {what} in {rung['case']}{at} (limit {percent(TARGET)})."
+        return f"{isolated(rung['policy'])} {what} in {isolated(rung['case'])}{at} (limit {percent(TARGET)})."
 
     def section(self, index: int, family: str, names: list[str], featured: str | None) -> dict[str, Any]:
         """One family: the chart of one of its cases and the tables of all."""
@@ -172,7 +173,10 @@ class View:
 
     def failures(self, case: str) -> pd.DataFrame:
         """Rungs of a case without a result, one line for each policy, state and reason."""
-        bad = self.rungs[(self.rungs["case"] == case) & (self.rungs["state"] != "ok")]
+        rungs = self.rungs[self.rungs["case"] == case]
+        silent = (rungs["state"] == "ok") & rungs["error"].isna()  # ran, but the headline is not defined here
+        rungs = rungs.assign(state=rungs["state"].mask(silent, "no figure"))
+        bad = rungs[rungs["state"] != "ok"]
         grouped = bad.groupby(["policy", "engine", "state", "reason"], sort=False)["step_text"]
         return grouped.agg(lambda texts: listing(text or "every step" for text in texts)).reset_index(name="steps")
 
@@ -186,17 +190,13 @@ class View:
         )
         missed = [p for p, r in found.items() if r is None and (lines[p]["state"] == "ok").any()]
         silent = [p for p in lines if not (lines[p]["state"] == "ok").any()]
-        best = [f"{p} {self.price(rung)}" for _, p, rung in reached]
+        best = [f"{isolated(p)} {price(rung)}" for _, p, rung in reached]
         goal = "1 % error" if unit == "1" else f"an error of {TARGET} {unit}"
-        text = f"To stay below {goal}: {listing(best, 20)}." if best else f"No policy stays below {goal}."
+        scale = "ms per simulated second" if lines and next(iter(lines.values()))["timed"].all() else "step"
+        text = f"To stay below {goal}, {scale}: {'; '.join(best)}." if best else f"No policy stays below {goal}."
         if missed and best:
             text += f" {listing(missed, 20)} {'does' if len(missed) == 1 else 'do'} not get there."
         return text + (f" No result: {listing(silent, 20)}." if silent else "")
-
-    def price(self, rung: pd.Series) -> str:
-        """Cost of a rung for a sentence."""
-        step = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
-        return f"{number(rung['cost'])} ms per simulated second{step}" if rung["timed"] else step.strip() or "any step"
 
     def measure_table(self, case: str) -> dict[str, Any]:
         """Every measure by policy, at the finest step that all stepping policies with a result share."""
@@ -294,3 +294,9 @@ class View:
             ([f"{whole}; embedded here is the worst phase of every rung."], brief.to_dict("records")),
             ([f"{whole}; no data is embedded here."], None),
         ]
+
+
+def price(rung: pd.Series) -> str:
+    """Cost of a rung for a sentence that has named the unit."""
+    step = f"{rung['step_text']} s" if rung["step"] > 0 else "no fixed step"
+    return f"{number(rung['cost'])} ({step})" if rung["timed"] else step

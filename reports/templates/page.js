@@ -18,14 +18,13 @@ async function draw(box) {
   }
 }
 
-// A chart is drawn when it comes near the window: sixty at once would hold the page up.
-const seen = new IntersectionObserver((entries) => {
-  for (const entry of entries.filter((e) => e.isIntersecting)) {
-    seen.unobserve(entry.target);
-    draw(entry.target);
+// One after another with a pause between, so that the page can be read and scrolled meanwhile.
+async function drawAll() {
+  for (const box of document.querySelectorAll(".chart")) {
+    await draw(box);
+    await new Promise((done) => setTimeout(done, 0));
   }
-}, { rootMargin: "600px" });
-document.querySelectorAll(".chart").forEach((box) => seen.observe(box));
+}
 
 // Same rule as the report's: the cheapest rung that meets the target together with every finer one.
 function score(ladder, target) {
@@ -53,3 +52,4 @@ filter.addEventListener("input", () => {
   for (const row of rows) row.hidden = !row.cells[0].textContent.toLowerCase().includes(filter.value.toLowerCase());
 });
 document.querySelector(".control").hidden = false;
+await drawAll();
