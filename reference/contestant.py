@@ -12,8 +12,8 @@ from impactbench.reference.stepped import SWEEPS, Rules, run, start
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
-STRATEGIES = {"default": "project", "tuned": "project", "revert": "revert"}
-"""Profile -> strategy of R4. The reference has nothing to tune, so `tuned` is its default."""
+STRATEGIES = {"stepped": "project", "revert": "revert"}
+"""Profile -> strategy of R4."""
 
 TOUCH, STILL = 1e-10, 1e-13
 """Gap that counts as touching and speed that counts as none, next to the scene's length and speed."""
