@@ -32,7 +32,7 @@ def rigid_offset_hit(offset: float, bounciness: float) -> Case:
     Elastic (R14) and law `nc`, k = 1/m_A + 1/m_B + offset^2/I_B: J = (1 + e) v/k along the normal.
     Law `doc` interpolates between J at e = 1 and the two bodies momentarily joined.
     """
-    radius, half, masses, duration = 0.1, (0.1, 0.5, 0.1), (1.0, 2.0), 1.0
+    radius, half, masses, duration = 0.1, (0.1, 0.5, 0.1), (1.0, 4.0), 1.0
     parameters: Parameters = {"offset": offset, "bounciness": bounciness}
     scene = Scene(
         name=case_name("rigid_offset_hit", parameters),
