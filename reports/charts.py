@@ -6,7 +6,6 @@ turned back into data values, so that one pair of logarithmic scales carries the
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 import vl_convert
+from impactbench.reports.chart_labels import LETTER, LINE, Box, between, place
 from impactbench.reports.page_data import FLOOR, isolated
 
 # Okabe and Ito's palette without yellow (illegible on white) and black (illegible on a dark page).
@@ -22,8 +22,7 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 # Eight shapes against seven colours: 56 policies before a pair repeats.
 SHAPES = ("circle", "square", "triangle-up", "diamond", "cross", "triangle-down", "triangle-right", "triangle-left")
 WIDTH, HEIGHT = 780, 290
-FLOOR_RAIL, FAIL_RAIL, LINE = 54, 210, 13  # pixels
-Box = tuple[float, float, float, float]  # left, top, right, bottom in pixels
+FLOOR_RAIL, FAIL_RAIL = 54, 210  # pixels
 INK = "currentColor"  # follows the page, in its light and its dark scheme
 
 
@@ -81,41 +80,6 @@ def pareto(points: pd.DataFrame) -> pd.DataFrame:
     return points.loc[keep]
 
 
-def place(wanted: list[tuple[float, float, str]], taken: list[Box], right: float) -> list[tuple[float, float]]:
-    """Give every label (x, y, text) a free spot near its point, left edge and middle line: greedy, at most 12 lines
-    up or down on either side, else where it began.
-    """
-    boxes = list(taken)
-    spots = []
-    for x, y, text in wanted:
-        width = 6.4 * len(text)
-        options = []
-        for step in range(24):
-            top = y + (step + 1) // 2 * LINE * (-1 if step % 2 else 1) - LINE / 2
-            options += [(left, top, left + width, top + LINE) for left in (x + 9, x - 9 - width)]
-        inside = [o for o in options if o[0] > FLOOR_RAIL / 2 and o[2] < right and 0 <= o[1] <= HEIGHT - LINE]
-        free = [option for option in inside if not any(overlap(option, box) for box in boxes)]
-        box = (free or inside or options)[0]
-        boxes.append(box)
-        spots.append((box[0], box[1] + LINE / 2))
-    return spots
-
-
-def obstacles(line: list[tuple[float, float]]) -> list[Box]:
-    """Boxes around a curve's points and around places between them, for labels to keep clear of."""
-    boxes = [(x - 6, y - 6, x + 6, y + 6) for x, y in line]
-    for (x0, y0), (x1, y1) in itertools.pairwise(line):
-        for part in (0.2, 0.4, 0.6, 0.8):
-            x, y = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
-            boxes.append((x - 2, y - 2, x + 2, y + 2))
-    return boxes
-
-
-def overlap(a: Box, b: Box) -> bool:
-    """Whether two boxes (left, top, right, bottom) share area."""
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
 @dataclass(frozen=True)
 class Style:
     """Colour per engine and shape per policy, the same in every chart of a page."""
@@ -157,7 +121,9 @@ def work_precision(
     """
     shown = points[points["error"] > FLOOR]
     costs = [*points["cost"], *points["low"].dropna(), *points["high"].dropna()]
-    axes = Axes(span([*shown["error"], 1e-2], 0.12), span(costs, 0.2), FAIL_RAIL if len(failed) else 0)
+    axes = Axes(
+        span([*shown["error"], 1e-2], 0.12), span([*costs, 1.6 * max(costs)], 0.15), FAIL_RAIL if len(failed) else 0
+    )
     spots = [axes.pixel(e, c) for e, c in zip(points["error"], points["cost"], strict=True)]
     points = points.assign(x=[axes.at_x(x) for x, _ in spots], y=points["cost"])
     layers = [*rails(axes), *curves(points, style), *labels(points, spots, axes)]
@@ -200,7 +166,7 @@ def rails(axes: Axes) -> list[alt.Chart]:
     bands = [{**b, "y": axes.at_y(HEIGHT), "y2": axes.at_y(0)} for b in bands]
     texts = [{**t, "y": axes.at_y(10)} for t in texts]
     texts.append({"x": axes.at_x(FLOOR_RAIL + 4), "y": axes.at_y(HEIGHT - 9), "t": "↙ better"})
-    texts.append({"x": axes.at_x(axes.pixel(1e-2, 1.0)[0] + 3), "y": axes.at_y(10), "t": "1 %"})
+    texts.append({"x": axes.at_x(axes.pixel(1e-2, 1.0)[0] + 3), "y": axes.at_y(HEIGHT - 9), "t": "1 %"})
     target = frame_of([{"x": 1e-2, "y": axes.at_y(0), "y2": axes.at_y(HEIGHT)}])
     return [
         alt.Chart(frame_of(bands)).mark_rect(opacity=0.07, fill=INK).encode(x2="x2:Q", y2="y2:Q"),
@@ -234,20 +200,25 @@ def labels(points: pd.DataFrame, spots: list[tuple[float, float]], axes: Axes) -
     """Policy and finest step at each line's fine end, the coarsest step at the other."""
     numbered = points.assign(row=range(len(points)))
     wanted: list[tuple[float, float, str]] = []
-    taken: list[Box] = []
+    segments: list[Box] = []
     for policy, line in numbered.groupby("policy", sort=False):
         ordered = line.sort_values("step")
-        taken += obstacles([spots[int(row)] for row in ordered["row"]])
+        segments += between([spots[int(row)] for row in ordered["row"]])
         name = f"{short(str(policy))}  {ordered.iloc[0]['step_text']}".rstrip()
         wanted.append((*spots[int(ordered.iloc[0]["row"])], name))
         if len(ordered) > 1:
             wanted.append((*spots[int(ordered.iloc[-1]["row"])], str(ordered.iloc[-1]["step_text"])))
     wanted.sort(key=lambda item: -len(item[2]))  # names first: they are the ones that must stay close
-    placed = place(wanted, taken, WIDTH - axes.fail)
+    placed = place(
+        wanted,
+        [(x - 6, y - 6, x + 6, y + 6) for x, y in spots],
+        segments,
+        (FLOOR_RAIL / 2, 0, WIDTH - axes.fail, HEIGHT),
+    )
     texts, leaders = [], []
     for (x, y, text), (left, middle) in zip(wanted, placed, strict=True):
         texts.append({"x": axes.at_x(left), "y": axes.at_y(middle), "t": text})
-        near = left if left > x else left + 6.4 * len(text)
+        near = left if left > x else left + LETTER * len(text)
         if abs(middle - y) > LINE:  # moved aside: say which point it belongs to
             ends = {"x2": axes.at_x(near), "y2": axes.at_y(middle)}
             leaders.append({"x": axes.at_x(x), "y": axes.at_y(y), **ends})

@@ -100,3 +100,9 @@ def order(line: pd.DataFrame) -> dict[str, Any] | None:
     spread = float(np.std(x) * np.std(y))
     r2 = float(np.mean((x - x.mean()) * (y - y.mean())) / spread) ** 2 if spread > 0 else 0.0
     return {"slope": slope, "r2": r2, "rungs": listing(usable["step_text"])}
+
+
+def price(rung: pd.Series) -> str:
+    """Cost of a rung for a sentence that has named the unit."""
+    step = f"{rung['step_text']} s" if rung["step"] > 0 else "no fixed step"
+    return f"{number(rung['cost'])} ({step})" if rung["timed"] else step

@@ -16,6 +16,7 @@ from impactbench.reports.page_data import (
     number,
     order,
     percent,
+    price,
     tidy_cells,
     tidy_rungs,
     time_to,
@@ -294,9 +295,3 @@ class View:
             ([f"{whole}; embedded here is the worst phase of every rung."], brief.to_dict("records")),
             ([f"{whole}; no data is embedded here."], None),
         ]
-
-
-def price(rung: pd.Series) -> str:
-    """Cost of a rung for a sentence that has named the unit."""
-    step = f"{rung['step_text']} s" if rung["step"] > 0 else "no fixed step"
-    return f"{number(rung['cost'])} ({step})" if rung["timed"] else step
