@@ -8,7 +8,7 @@ from impactbench.scenarios.records import Body, Contact, Model, Scene, Sphere
 from impactbench.scenarios.truth import Case, Family, Truth
 
 RADIUS, SPEED, DURATION = 0.1, 3.0, 1.0
-APPROACH = 0.53  # gap [m] before the first ball, so that the first impact falls on no common multiple of steps
+APPROACH = 0.536  # gap [m] before the first ball, so that the first impact falls on no common multiple of steps
 
 
 def _row(family: str, parameters: Parameters, masses: list[float], gap: float) -> Scene:
