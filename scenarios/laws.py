@@ -31,7 +31,8 @@ def nc_relative(u: Floats, normal: Floats, e: float) -> Floats:
 
 def impact(law: Law, masses: tuple[float, float], velocities: Pair, normal: Floats, bounciness: float) -> Pair:
     """Velocities [m/s] of A and B just after an impact with unit normal n from A to B.
-    Masses [kg]; `math.inf` is static."""
+    Masses [kg]; `math.inf` is static.
+    """
     (m_a, m_b), (v_a, v_b) = masses, velocities
     share_a, share_b = mass_shares(m_a, m_b)
     relative = doc_relative if law == "doc" else nc_relative

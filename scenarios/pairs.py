@@ -19,8 +19,8 @@ OFFSETS = (0.25, 0.5, 0.75)
 
 
 def contact_time(separation: Floats, relative: Floats, reach: float) -> float:
-    """First time [s] at which two spheres touch: the smaller root of |d + u t| = R_A + R_B, in the form that does not
-    cancel.
+    """First time [s] at which two spheres touch: the smaller root of |d + u t| = R_A + R_B, in the form that does
+    not cancel.
 
     d [m] from A to B and u [m/s] of B relative to A; `math.inf` where they miss.
     """
@@ -70,7 +70,8 @@ def _case(
 
 def equal_masses(bounciness: float, frame: float = 0.0) -> Case:
     """Head-on (R12): b = 1 swaps the velocities, b = 0 gives both the average, else v_A' = (1 - b) v/2 and v_B' = (1 +
-    b) v/2."""
+    b) v/2.
+    """
     parameters: Parameters = {"bounciness": bounciness}
     if frame:
         parameters["frame"] = frame

@@ -64,7 +64,8 @@ def opening(scene: Scene) -> Piece:
 
 def motion(pieces: Sequence[Piece]) -> Callable[[float], State]:
     """The state at any time: that of the latest piece begun (at an impact: just after it).
-    Before 0 the first piece holds."""
+    Before 0 the first piece holds.
+    """
     starts = [piece.start for piece in pieces]
     return lambda time: pieces[max(bisect_right(starts, time) - 1, 0)].at(time)
 

@@ -1,5 +1,6 @@
 """One sphere and immovable walls: head-on, oblique, and the billiard in a rectangular box.
-One-way impacts (R13), no gravity."""
+One-way impacts (R13), no gravity.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +92,8 @@ def unfolding_times(start: Floats, velocity: Floats, room: Floats, duration: flo
 
 def box_of_walls(dimension: int, hit: str = "faces") -> Case:
     """A sphere in a box of half-spaces, b = 1: exact for all time by `unfold`.
-    A corner hit reverses both components at once."""
+    A corner hit reverses both components at once.
+    """
     parameters: Parameters = {"dimension": dimension, "hit": hit}
     axes = AXES[dimension]
     # Directions are irrational enough to meet no corner within the duration, or else aim at a corner from the middle.
