@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 NOTHING_MEASURED = 3
 STEP_HELP = "Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960."
+PHASES_HELP = "Impact phases tried per step in the cases that are timed; the worst one counts."
 TIMING_HELP = "Time a case of each of six families, every case, or none."
 ENGINE_HELP = "An engine (mujoco), a contestant (mujoco/tuned), a glob, or FILE.py:Class for your own. Repeatable."
 
@@ -124,6 +125,7 @@ def _progress() -> Iterator[Progress]:
 @click.option(
     "--timing", type=click.Choice(["some", "all", "none"]), default="some", show_default=True, help=TIMING_HELP
 )
+@click.option("--phases", type=click.IntRange(1, 64), default=3, show_default=True, help=PHASES_HELP)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Cells run at once. Default: cores.")
 def compare(
@@ -134,6 +136,7 @@ def compare(
     steps: tuple[str, ...],
     model: str,
     timing: str,
+    phases: int,
     out: Path,
     jobs: int,
 ) -> None:
@@ -148,7 +151,9 @@ def compare(
     from impactbench.reports.compare import compare as run_comparison
 
     models = ("minimal", "full") if model == "both" else (model,)
-    plan = Plan(chosen, contestants, steps or LADDER, law, models, jobs=jobs, timing=timing)
+    plan = Plan(
+        chosen, contestants, steps or LADDER, law, models, tuple(k / phases for k in range(phases)), jobs, timing
+    )
     with _progress() as progress:
         document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
     _write(document, folder)

@@ -36,7 +36,10 @@ Entry = tuple[Cell, Contestant]
 
 @dataclass(frozen=True)
 class Plan:
-    """What to run. `law` is for the contestants that can choose theirs; `phases` in steps."""
+    """What to run. `law` is for the contestants that can choose theirs.
+
+    Cases that are timed run at every one of `phases` [steps], so that no lucky step earns a rung; others at the first.
+    """
 
     cases: Sequence[Case]
     contestants: Sequence[Contestant]
@@ -47,22 +50,31 @@ class Plan:
     jobs: int = 1
     timing: str = "some"
 
+    def timed(self) -> set[str]:
+        """Names of the cases to time. `some`: the first of each of six families, or of all where few are asked for."""
+        if self.timing != "some":
+            return {case.scene.name for case in self.cases} if self.timing == "all" else set()
+        first: dict[str, str] = {}
+        for case in self.cases:
+            first.setdefault(case.scene.family, case.scene.name)
+        few = len(first) <= len(TIMED_FAMILIES)
+        return {name for family, name in first.items() if few or family in TIMED_FAMILIES}
+
     def cells(self) -> list[Entry]:
         """In an order that keeps an engine's cells together."""
+        timed = self.timed()
         return [
             (Cell(case.scene.name, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
             for contestant in self.contestants
             for case in self.cases
             for model in self.models
-            for phase in (self.phases if case.scene.phase_free else (0.0,))
+            for phase in (self.phases if case.scene.phase_free and case.scene.name in timed else self.phases[:1])
             for step in self.steps
         ]
 
 
 def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:
-    """Engines realise Newton-Coulomb; the reference the law asked for, else the documents'. A scene of one law has
-    no choice.
-    """
+    """Engines realise Newton-Coulomb, the reference the law asked for, else the documents'; a scene may leave no choice."""
     laws = case.scene.laws
     wanted = asked if asked and contestant.law == "doc" else contestant.law
     return wanted if wanted in laws else laws[0]
@@ -85,7 +97,7 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
         ],
     }
     outcomes = accuracy_lane(cells, plan.jobs, progress)
-    timings = timing_lane(_timed(plan, cells, outcomes), progress) if plan.timing != "none" else {}
+    timings = timing_lane(_timed(plan, cells, outcomes), progress)
     for cell, contestant in cells:
         outcome = outcomes[cell.key]
         document["cells"].append(_cell_record(cell, contestant, outcome))
@@ -123,14 +135,7 @@ def _as_cell(outcome: Outcome) -> dict[str, Any]:
 
 def _timed(plan: Plan, cells: Sequence[Entry], outcomes: dict[str, dict[str, Any]]) -> list[list[Entry]]:
     """Groups of cells to be timed against one another: one group a case, healthy cells of the first phase only."""
-    first: dict[str, str] = {}
-    for case in plan.cases:
-        first.setdefault(case.scene.family, case.scene.name)
-    names = (
-        {case.scene.name for case in plan.cases}
-        if plan.timing == "all"
-        else {name for family, name in first.items() if family in TIMED_FAMILIES or len(first) <= len(TIMED_FAMILIES)}
-    )
+    names = plan.timed()
     groups: dict[str, list[Entry]] = {}
     for cell, contestant in cells:
         if cell.case in names and cell.phase == plan.phases[0] and outcomes[cell.key]["state"] == "ok":
