@@ -14,6 +14,7 @@ from typing import Any
 import altair as alt
 import pandas as pd
 import vl_convert
+from altair.utils.schemapi import debug_mode as debug_mode
 from impactbench.reports.chart_labels import LETTER, LINE, Box, between, place
 from impactbench.reports.page_data import FLOOR, isolated
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import vl_convert
 from impactbench.reports import results
 from impactbench.reports.page_data import number, percent, words
 from impactbench.reports.page_view import View
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 BUDGET = 3_000_000  # bytes of the whole page
 
@@ -49,9 +50,16 @@ def environment() -> jinja2.Environment:
     """Templates with escaping on for every value."""
     loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
     found = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
-    found.filters.update(number=number, percent=percent, safe_json=safe_json, words=words, svg=Markup)
+    found.filters.update(
+        number=number, percent=percent, safe_json=safe_json, breakable=breakable, words=words, svg=Markup
+    )
     found.trim_blocks = found.lstrip_blocks = True
     return found
+
+
+def breakable(name: str) -> Markup:
+    """Name that may be wrapped where its parts meet."""
+    return Markup(re.sub(r"([\[/,])", r"\1<wbr>", str(escape(name))))
 
 
 def safe_json(value: Any) -> Markup:

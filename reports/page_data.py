@@ -106,3 +106,10 @@ def price(rung: pd.Series) -> str:
     """Cost of a rung for a sentence that has named the unit."""
     step = f"{rung['step_text']} s" if rung["step"] > 0 else "no fixed step"
     return f"{number(rung['cost'])} ({step})" if rung["timed"] else step
+
+
+def finding(rung: pd.Series, what: str, above: bool) -> str:
+    """One worst case in a sentence: who, what, where, and whether the limit of 1 % is kept."""
+    at = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
+    side = "above" if above else "within"
+    return f"{isolated(rung['policy'])} {what} in {isolated(rung['case'])}{at} ({side} the limit of 1 %)."

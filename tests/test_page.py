@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import altair as alt
 import pytest
 from impactbench.reports import page
 from impactbench.reports.page_data import time_to
@@ -189,6 +190,11 @@ def test_an_exact_result_sits_on_the_floor_rail(html: str) -> None:
     smallest = min(row["x"] for rows in spec["datasets"].values() for row in rows if row.get("error", 0) > 0)
     assert drawn
     assert all(low < x < smallest for x in drawn)
+
+
+def test_the_specifications_keep_to_the_schema(html: str) -> None:
+    for spec in specs(html):
+        alt.LayerChart.from_dict(json.loads(spec), validate=True)
 
 
 def test_the_law_difference_is_apart(html: str) -> None:
