@@ -88,17 +88,18 @@ def resolve_impacts(bodies: Bodies, pairs: Pairs, active: Indices, slow: Floats,
 
 
 @compiled
-def hold(bodies: Bodies, pairs: Pairs, active: Indices, rubbing: bool, tolerance: float, sweeps: int) -> bool:
+def hold(bodies: Bodies, pairs: Pairs, active: Indices, rubbing: bool, tolerance: float, sweeps: int) -> float:
     """Inelastic along n for all contacts at once: sequential impulses with their sums kept at or above 0, started
     from `push`.
 
-    With `rubbing`, lasting contacts also get Coulomb friction within mu times their own sum. True once no sweep
-    changes a velocity by more than `tolerance` [m/s].
+    With `rubbing`, lasting contacts also get Coulomb friction within mu times their own sum. Ends once no sweep
+    changes a velocity by more than `tolerance` [m/s], or after `sweeps`; returns the last change [m/s].
     """
     for p in active:
         n, push = pairs.normal[p], pairs.push[p]
         exchange(bodies, pairs, p, push * n[0], push * n[1], push * n[2])
         pairs.rub[p] = 0.0
+    worst = 0.0
     for sweep in range(sweeps):
         worst = 0.0
         for i in range(len(active)):
@@ -108,8 +109,8 @@ def hold(bodies: Bodies, pairs: Pairs, active: Indices, rubbing: bool, tolerance
             if rubbing and pairs.touched[p] and pairs.friction[p] > 0:
                 worst = max(worst, grip(bodies, pairs, p))
         if worst <= tolerance:
-            return True
-    return len(active) == 0
+            break
+    return worst
 
 
 @compiled
