@@ -1,4 +1,4 @@
-"""Quaternions (w, x, y, z) for arrays of bodies, shape [n, 4]: what adapters need to read orientations and spins in world axes."""
+"""Quaternions (w, x, y, z) of many bodies, shape [n, 4]: what adapters need to read turns and spins in world axes."""
 
 from __future__ import annotations
 

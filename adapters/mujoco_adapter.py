@@ -1,8 +1,9 @@
 """MuJoCo: contacts as soft constraints, v before x (Euler), any subset of axes through joints.
 
-Pair coefficients: explicit <pair> elements where coefficients differ or friction needs its own reference; else they are set on geoms.
-Restitution has no parameter of its own. The tuned profile makes a contact answer within one step: with stiffness K ~ 0 and damping
-B = (1+e)/h the reference acceleration -B v over one step turns v into -e v (Euler and implicit integrators only).
+Pair coefficients: explicit <pair> elements where coefficients differ or friction needs its own reference; else they are
+set on geoms. Restitution has no parameter of its own. The tuned profile makes a contact answer within one step: with
+stiffness K ~ 0 and damping B = (1+e)/h the reference acceleration -B v over one step turns v into -e v (Euler and
+implicit integrators only).
 Cannot express: viscous friction on planes that are oblique to the axes.
 """
 
@@ -48,13 +49,13 @@ class MuJoCo:
         self._need = need(scene, model, self._contacts)
         self._free = model.rotation and self._axes == (0, 1, 2) and not self._rates
         self._settings: dict[str, object] = {}
-        # Every warning would be appended to a log file in the working directory; the counters in `warning` tell as much.
+        # Else every warning is appended to a log file in the working directory; the counters in `warning` tell as much.
         mj.set_mju_user_warning(lambda _: None)
         self._m = mj.MjModel.from_xml_string(self._xml())
         self._d = mj.MjData(self._m)
         movable = [scene.bodies[i] for i in scene.movable]
-        self._start = np.array([b.position for b in movable]).reshape(-1, 3)
-        self._turned = np.array([b.orientation for b in movable]).reshape(-1, 4)
+        self._start = np.array([b.position for b in movable], dtype=float).reshape(-1, 3)
+        self._turned = np.array([b.orientation for b in movable], dtype=float).reshape(-1, 4)
         self._set_velocities(movable)
 
     @property
@@ -77,7 +78,7 @@ class MuJoCo:
             x[:, self._axes] += q[:, :k]
         v[:, self._axes] = u[:, :k]
         if any(warning[w].number for w in LOST):
-            # By default the engine puts the whole world back to its start on a bad number: that must not pass for a state.
+            # On a bad number the engine puts the whole world back to its start: that must not pass for a state.
             x[:], v[:] = math.nan, math.nan
         if not self._model.rotation:
             return State(x, v)
@@ -88,7 +89,7 @@ class MuJoCo:
         del self._d, self._m
 
     def _turns(self, q: Floats, u: Floats) -> tuple[Floats, Floats]:
-        """Turns since t = 0 and world spins. A hinge counts an angle; ball and free joints have spins in the turned frame."""
+        """Turns since t = 0 and world spins. A hinge is an angle; ball and free joints spin in the turned frame."""
         if len(self._axes) == 2:
             across = 3 - sum(self._axes)
             spin = np.zeros((len(u), 3))
@@ -126,7 +127,10 @@ class MuJoCo:
             for i in (*self._scene.statics, *self._scene.movable)
         )
         pairs = "".join(self._pair(a, b) for a, b in self._pairs) if listed else ""
-        return f"<mujoco><option {_attributes(option)}>{flag}</option><worldbody>{bodies}</worldbody><contact>{pairs}</contact></mujoco>"
+        return (
+            f"<mujoco><option {_attributes(option)}>{flag}</option>"
+            f"<worldbody>{bodies}</worldbody><contact>{pairs}</contact></mujoco>"
+        )
 
     def _rough(self) -> bool:
         return self._model.friction and not self._rates and any(c.friction for c in self._contacts)
@@ -148,14 +152,14 @@ class MuJoCo:
     def _normal(self, e: float) -> str:
         if self._need != "resting":
             return f"-1e-12 {-(1 + e) / self._h!r}"
-        # Piles need overlaps pushed out. The stiff spring is the better one, but throws up piles dropped at coarse steps.
+        # Piles need overlaps pushed out. The stiff spring does it better, but throws piles up at coarse steps.
         return f"{2 * self._h!r} 1" if self._h < 0.01 else f"{-0.02 / self._h**2!r} {-1 / self._h!r}"
 
     def _grip(self, mu: float) -> float:
         """Damping [1/s] of slip: 1/h sticks within one step, as an impact needs, but makes lasting contacts hop.
 
-        Below the speed mu g/grip a slide fades instead of stopping, which adds (mu g/(grip v))^2 of its length; this grip makes that
-        as large as the integrator's own mu g h/v, and the hops small.
+        Below the speed mu g/grip a slide fades instead of stopping, which adds (mu g/(grip v))^2 of its length; this
+        grip makes that as large as the integrator's own mu g h/v, and the hops small.
         """
         if self._need != "sliding":
             return 1 / self._h

@@ -1,8 +1,8 @@
 """pybullet (Bullet 2.8x, double precision): v before x, 3D always.
 
 Pair coefficients: the engine multiplies the two surfaces' restitution and friction, so `surface_factors` splits them.
-Cannot express: locked axes (a planar scene stays planar by its symmetry); locked rotation in maximal coordinates (there rotation is
-left free and simply not read); viscous friction unless the whole velocity of a body may be damped.
+Cannot express: locked axes (a planar scene stays planar by its symmetry); locked rotation in maximal coordinates (there
+rotation is left free and simply not read); viscous friction unless the whole velocity of a body may be damped.
 """
 
 from __future__ import annotations
@@ -95,20 +95,23 @@ class Bullet:
             pb.resetSimulation(self._c)
 
     def _coordinates(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> tuple[bool, bool]:
-        """(maximal coordinates, rotation locked): only reduced coordinates can lock rotation, only maximal ones split impulses."""
+        """(maximal, rotation locked): only reduced coordinates can lock rotation, only maximal ones split impulses."""
         if self._rates:
             return True, False  # the damping of reduced coordinates is quadratic in speed
         wanted = need(scene, model, distinct_contacts(scene, pairs))
+        balls = all(isinstance(scene.bodies[i].shape, Sphere) for i in scene.movable)
         if wanted == "sliding":
-            balls = all(isinstance(scene.bodies[i].shape, Sphere) for i in scene.movable)
             return (model.rotation and balls), not model.rotation
-        return True, False
+        # Boxes that do not turn: bouncing ones under gravity gain energy in reduced coordinates, so those stay maximal.
+        locked = not model.rotation and not balls and (wanted == "resting" or not any(gravity_of(scene, model)))
+        return not locked, locked
 
     def _tune(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> None:
         chosen: dict[str, float | int] = dict(MAXIMAL if self._maximal else REDUCED)
-        if not self._maximal and not self._locked:
-            chosen = dict(EXACT)  # a box free to tip needs overlaps pushed out, or it sinks at its front edge
-        if need(scene, model, distinct_contacts(scene, pairs)) == "resting":
+        resting = need(scene, model, distinct_contacts(scene, pairs)) == "resting"
+        if not self._maximal and (resting or not self._locked):
+            chosen = dict(EXACT)  # piles, and boxes free to tip, need overlaps pushed out: else they sink
+        if resting:
             chosen["numSolverIterations"] = 200
         pb.setPhysicsEngineParameter(**chosen, physicsClientId=self._c)
         self._settings |= chosen | SURFACE | {"useMaximalCoordinates": self._maximal}
@@ -133,7 +136,7 @@ class Bullet:
         if self._tuned:
             surface |= SURFACE
         if body.mass is not None:
-            # Mass goes along, or maximal coordinates set it to 0; the engine's own inertia of a capsule is that of a box.
+            # Mass goes along, or maximal coordinates set it to 0; the engine's own capsule has the inertia of a box.
             inertia = (0, 0, 0) if self._locked else body.principal_inertia()
             surface |= {"mass": body.mass, "localInertiaDiagonal": inertia}
             if rate is not None:

@@ -1,7 +1,8 @@
 """pymunk (Munk2D): planar, sequential impulses, x before v.
 
 Pair coefficients: the engine multiplies the two surfaces' elasticity and friction, so `surface_factors` splits them.
-Cannot express: motion along three axes; boxes that do not stand square to the plane; viscous friction unless all bodies share c/m.
+Cannot express: motion along three axes; boxes that do not stand square to the plane; viscous friction unless all bodies
+share c/m.
 Bodies carry the inertia of their 3D shape about the axis across the plane: a disc here is the scene's ball.
 """
 
@@ -52,10 +53,12 @@ class Pymunk:
         _check_planar(scene, self._across, model)
         pairs = can_meet(scene, axes)
         self._space = pymunk.Space()
-        self._space.gravity = self._flat(gravity_of(scene, model))
+        # Across the axes that move, what holds a body against gravity is not built either.
+        gravity = gravity_of(scene, model)
+        self._space.gravity = self._flat(np.array([g if k in axes else 0.0 for k, g in enumerate(gravity)]))
         self._settings: dict[str, object] = {"combination": "product of surfaces"}
         if profile == "tuned":
-            self._tune(scene, model, need(scene, model, distinct_contacts(scene, pairs)) == "resting")
+            self._tune(scene, need(scene, model, distinct_contacts(scene, pairs)) == "resting")
         if rates:
             self._damp(scene, rates)
         bounce = surface_factors(scene, pairs, lambda c: c.bounciness, 1.0)
@@ -64,8 +67,8 @@ class Pymunk:
         for i in (*scene.movable, *scene.statics):  # movable first: the bulk read lists statics last
             self._add(scene, i, bounce[i], rough[i], i in met)
         movable = [scene.bodies[i] for i in scene.movable]
-        self._start = np.array([b.position for b in movable]).reshape(-1, 3)
-        self._turned = np.array([b.orientation for b in movable]).reshape(-1, 4)
+        self._start = np.array([b.position for b in movable], dtype=float).reshape(-1, 3)
+        self._turned = np.array([b.orientation for b in movable], dtype=float).reshape(-1, 4)
         self._buffer = batch.Buffer()
 
     @property
@@ -97,7 +100,7 @@ class Pymunk:
         a, b = self._plane
         return (float(vector[a]), float(vector[b]))
 
-    def _tune(self, scene: Scene, model: Model, resting: bool) -> None:
+    def _tune(self, scene: Scene, resting: bool) -> None:
         # The default slop of 0.1 is a length: a tenth of a metre of overlap is left alone.
         self._space.collision_slop = 1e-4 * scene.length
         self._space.iterations = 100 if resting else 30
@@ -175,7 +178,7 @@ def _check_planar(scene: Scene, across: int, model: Model) -> None:
 
 
 def _reach(scene: Scene) -> float:
-    """Half size [m] of the polygon that stands for a half-space: nothing gets past its edges within the scene's time."""
+    """Half size [m] of the polygon that stands for a half-space: nothing gets past its edges in the scene's time."""
     g = max(map(abs, scene.gravity))
     spread = max((abs(x) for b in scene.bodies for x in b.position), default=0.0)
     fastest = max((math.hypot(*b.velocity) for b in scene.bodies), default=0.0) + scene.speed + g * scene.duration

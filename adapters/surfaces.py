@@ -1,7 +1,7 @@
-"""What every engine needs to know of a scene: who can meet, which recipe it calls for, and what its surfaces must carry.
+"""What every engine needs to know of a scene: who can meet, which recipe it calls for, what its surfaces must carry.
 
-Scenes give coefficients per pair in contact. PyBullet and pymunk know coefficients per surface only and multiply the two that meet;
-`surface_factors` finds such surfaces or says that there are none.
+Scenes give coefficients per pair in contact. PyBullet and pymunk know them per surface only and multiply the two that
+meet; `surface_factors` finds such surfaces or says that there are none.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ ROUND_OFF = 1e-12
 def moving_axes(scene: Scene, model: Model) -> tuple[int, ...]:
     """Axes along which the engine must let bodies move.
 
-    Coulomb friction needs the normal force, and an engine knows normal forces only along axes that can move: where friction acts,
-    the axes of gravity join the model's. The planar truth is unchanged, since the bodies rest on what holds them.
+    Coulomb friction needs the normal force, and an engine knows normal forces only along axes that can move: where
+    friction acts, the axes of gravity join the model's. The planar truth is unchanged, since something holds the bodies.
     """
     axes = set(model.axes)
     if model.gravity and model.friction:
@@ -37,7 +37,7 @@ def gravity_of(scene: Scene, model: Model) -> tuple[float, float, float]:
 
 
 def can_meet(scene: Scene, axes: tuple[int, ...]) -> list[Pair]:
-    """Pairs of bodies (a < b) whose contact could change a motion along `axes`: never two statics, never a plane along all axes."""
+    """Pairs (a < b) whose contact could change a motion along `axes`: never two statics or a plane along them all."""
     if not scene.collide:
         return []
     idle = {i for i in scene.statics if _aside(scene.bodies[i].shape, axes)}
@@ -61,8 +61,8 @@ def distinct_contacts(scene: Scene, pairs: Iterable[Pair]) -> set[Contact]:
 def need(scene: Scene, model: Model, contacts: set[Contact]) -> Need:
     """Which recipe a scene calls for.
 
-    sliding: Coulomb friction in a contact that lasts from the start; resting: perfectly inelastic bodies under gravity (piles).
-    A pile that starts at rest is resting even with friction; a single body at rest may be on an incline, so it counts as sliding.
+    sliding: Coulomb friction in a contact that lasts from the start; resting: inelastic bodies under gravity (piles).
+    A pile that starts at rest is resting even with friction; a single body at rest may be on an incline: sliding.
     """
     heavy = any(gravity_of(scene, model))
     rough = model.friction and any(c.friction > 0 for c in contacts)
@@ -75,7 +75,7 @@ def need(scene: Scene, model: Model, contacts: set[Contact]) -> Need:
 
 
 def viscous_rates(scene: Scene, law: Law, profile: str) -> dict[int, float]:
-    """Damping c [kg/s] of every movable body, empty under Newton-Coulomb. Raises `Unsupported` where an engine has no such law."""
+    """Damping c [kg/s] of sliding bodies, empty under Newton-Coulomb; `Unsupported` where engines lack such a law."""
     if law == "nc":
         return {}
     pairs = can_meet(scene, (0, 1, 2))
@@ -108,7 +108,7 @@ def viscous_rates(scene: Scene, law: Law, profile: str) -> dict[int, float]:
 def surface_factors(
     scene: Scene, pairs: list[Pair], coefficient: Callable[[Contact], float], limit: float = math.inf
 ) -> list[float]:
-    """Factors s_i in [0, limit] per body with s_i s_j = coefficient of every pair that can meet; `Unsupported` if there are none."""
+    """Factors s_i in [0, limit] with s_i s_j = coefficient of every pair that can meet, else `Unsupported`."""
     if not scene.pairs:
         return [math.sqrt(coefficient(scene.contact))] * len(scene.bodies)
     factors = solve_products({pair: coefficient(scene.contact_of(*pair)) for pair in pairs}, limit)
@@ -120,8 +120,8 @@ def surface_factors(
 def solve_products(products: Mapping[Pair, float], limit: float = math.inf) -> dict[int, float] | None:
     """s_i in [0, limit] with s_i s_j = products[i, j] for every pair given, or None.
 
-    A body in any pair with a product above 0 has s > 0. Within a component joined by such pairs, s is known up to one number t:
-    s_i = k_i t or k_i / t, alternating along every edge; an odd cycle fixes t. All other bodies get 0.
+    A body in any pair with a product above 0 has s > 0. Within a component joined by such pairs, s is known up to one
+    number t: s_i = k_i t or k_i / t, alternating along every edge; an odd cycle fixes t. All other bodies get 0.
     """
     neighbours: dict[int, dict[int, float]] = {}
     for (a, b), value in products.items():
