@@ -72,14 +72,17 @@ def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
     weight = pairs.push.copy()
     pairs.push[:] = 0.0
     rest = hold(bodies, pairs, active, False, rules.still, SWEEPS)
-    pairs.push[:] = np.where(pairs.touching, weight, 0.0)
+    # A pair that parts before gravity acts is in flight: catching it within the step would do work on it.
+    lasting = active[parting(bodies, pairs, active) <= 1e3 * rules.still]
+    pairs.push[:] = 0.0
+    pairs.push[lasting] = weight[lasting]
     before, last = bodies.velocity.copy(), bodies.position.copy()
     for i in range(len(bodies.inverse_mass)):
         if bodies.inverse_mass[i] > 0:
             bodies.velocity[i] += rules.step * rules.gravity
-    rest = max(rest, hold(bodies, pairs, active, not rules.doc, rules.still, SWEEPS))
+    rest = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
     if rules.doc:
-        damp(bodies, pairs, active, rules.step, rules.still)
+        damp(bodies, pairs, lasting, rules.step, rules.still)
 
     bodies.velocity[:] *= rules.carried
     bodies.position[:] += rules.step / 2 * (before + bodies.velocity) * rules.carried
@@ -112,6 +115,15 @@ def slow_approach(pairs: Pairs, active: Indices, rules: Rules) -> Floats:
         n, g = pairs.normal[p], rules.gravity
         slow[p] = max(rules.still, 2 * rules.step * abs(g[0] * n[0] + g[1] * n[1] + g[2] * n[2]))
     return slow
+
+
+@compiled
+def parting(bodies: Bodies, pairs: Pairs, active: Indices) -> Floats:
+    """u . n [m/s] of the pairs `active`, positive where they part."""
+    speeds = np.zeros(len(active))
+    for i in range(len(active)):
+        speeds[i] = relative(bodies, pairs, active[i])[0]
+    return speeds
 
 
 @compiled
