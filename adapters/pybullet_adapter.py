@@ -103,7 +103,9 @@ class Bullet:
         if wanted == "sliding":
             return (model.rotation and balls), not model.rotation
         # Boxes that do not turn: bouncing ones under gravity gain energy in reduced coordinates, so those stay maximal.
-        locked = not model.rotation and not balls and (wanted == "resting" or not any(gravity_of(scene, model)))
+        if not balls and wanted == "resting":
+            return False, not model.rotation
+        locked = not model.rotation and not balls and not any(gravity_of(scene, model))
         return not locked, locked
 
     def _tune(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> None:

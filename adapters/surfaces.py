@@ -24,7 +24,7 @@ def moving_axes(scene: Scene, model: Model) -> tuple[int, ...]:
     """Axes along which the engine must let bodies move.
 
     Coulomb friction needs the normal force, and an engine knows normal forces only along axes that can move: where
-    friction acts, the axes of gravity join the model's. The planar truth is unchanged, since something holds the bodies.
+    friction acts, the axes of gravity join the model's. The planar truth is unchanged, since they rest on something.
     """
     axes = set(model.axes)
     if model.gravity and model.friction:
