@@ -1,5 +1,5 @@
 # Everything runs from .venv, made from requirements.lock (exact versions with hashes, wheels only).
-PYTHON ?= python3.11
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed

@@ -7,6 +7,7 @@ from impactbench.reports.geometry import rotation_matrices
 from impactbench.reports.impacts import Impact, PairHistory, flight_fraction
 from impactbench.scenarios.records import Law, Scene
 from impactbench.scenarios.trajectory import Floats, Trajectory
+from numpy.typing import NDArray
 
 
 def masses(scene: Scene) -> Floats:
@@ -45,22 +46,28 @@ def _outside_contacts(scene: Scene, law: Law, excess: Floats, steps: Floats, pai
         ]
     )
     left = excess.copy()
-    for k in np.flatnonzero(touched.any(axis=0)):
-        contacts = [pair for pair, near in zip(pairs, touched[:, k], strict=True) if near]
-        left[k] = _impossible_part(scene, law, excess[k], contacts, int(k))
+    # Steps in which the same statics are touched are treated together.
+    for pattern in np.unique(touched, axis=1).T:
+        if pattern.any():
+            steps_alike = np.flatnonzero((touched == pattern[:, None]).all(axis=0))
+            contacts = [pair for pair, near in zip(pairs, pattern, strict=True) if near]
+            left[steps_alike] = _impossible_part(scene, law, excess[steps_alike], contacts, steps_alike)
     return left
 
 
-def _impossible_part(scene: Scene, law: Law, impulse: Floats, contacts: list[PairHistory], k: int) -> Floats:
+def _impossible_part(
+    scene: Scene, law: Law, impulses: Floats, contacts: list[PairHistory], steps: NDArray[np.intp]
+) -> Floats:
     coefficients = [scene.contact_of(pair.a, pair.b) for pair in contacts]
     if law == "doc" and any(c.bounciness < 1 or c.viscosity > 0 for c in coefficients):
-        return np.zeros(3)
-    normals: Floats = np.array([pair.normal[k] for pair in contacts]).T
-    along: Floats = normals @ np.linalg.lstsq(normals, impulse, rcond=None)[0]
-    beyond = impulse - along
-    size = float(np.linalg.norm(beyond))
-    allowed = max(c.friction for c in coefficients) * float(np.linalg.norm(along)) if law == "nc" else 0.0
-    return np.zeros(3) if size <= allowed else np.asarray(beyond * (1 - allowed / size))
+        return np.zeros_like(impulses)
+    normals: Floats = np.stack([pair.normal[steps] for pair in contacts], axis=2)
+    along: Floats = (normals @ np.linalg.pinv(normals) @ impulses[:, :, None])[:, :, 0]
+    beyond = impulses - along
+    size = np.linalg.norm(beyond, axis=1)
+    friction = max(c.friction for c in coefficients) if law == "nc" else 0.0
+    over = np.maximum(size - friction * np.linalg.norm(along, axis=1), 0.0)
+    return np.asarray(beyond * (over / np.where(size > 0, size, 1.0))[:, None])
 
 
 def angular_momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, impacts: list[Impact]) -> float | None:

@@ -26,7 +26,7 @@ def rotation_matrices(quaternions: Floats) -> Floats:
 
 
 class Placed:
-    """A body's shape with its pose over time."""
+    """A body's shape with its pose over time: positions [T, 3]; one quaternion [1, 4] for a body that never turns."""
 
     def __init__(self, shape: Shape, positions: Floats, quaternions: Floats) -> None:
         self.shape = shape
@@ -48,7 +48,7 @@ class Placed:
         """Corners of a box [8, T, 3]."""
         assert isinstance(self.shape, Box)
         signs = np.array(list(product((-1.0, 1.0), repeat=3))) * np.array(self.shape.half_extents)
-        offsets: Floats = np.einsum("tij,cj->cti", self.axes, signs)
+        offsets: Floats = np.einsum("...ij,cj->c...i", self.axes, signs)
         return self.positions + offsets
 
 
@@ -59,7 +59,7 @@ def placed_bodies(scene: Scene, trajectory: Trajectory) -> list[Placed]:
 
     def place(index: int) -> Placed:
         body, row = scene.bodies[index], row_of.get(index)
-        turns = np.broadcast_to(np.array(body.orientation), (count, 4))
+        turns = np.array([body.orientation])
         if row is None:
             return Placed(body.shape, np.broadcast_to(np.array(body.position), (count, 3)), turns)
         if trajectory.orientations is not None:
@@ -127,7 +127,7 @@ def _ball_to_box(ball: Placed, box: Placed) -> tuple[Floats, Floats]:
     assert isinstance(ball.shape, Sphere)
     assert isinstance(box.shape, Box)
     extents = np.array(box.shape.half_extents)
-    local = np.einsum("tji,tj->ti", box.axes, ball.positions - box.positions)
+    local = np.einsum("...ji,...j->...i", box.axes, ball.positions - box.positions)
     outside = local - np.clip(local, -extents, extents)
     distance = np.linalg.norm(outside, axis=1)
     depth = extents - np.abs(local)
@@ -138,7 +138,7 @@ def _ball_to_box(ball: Placed, box: Placed) -> tuple[Floats, Floats]:
     inside = distance == 0
     direction = np.where(inside[:, None], inward, outside / np.where(inside, 1.0, distance)[:, None])
     signed = np.where(inside, -depth[rows, face], distance)
-    return signed - ball.shape.radius, -np.einsum("tij,tj->ti", box.axes, direction)
+    return signed - ball.shape.radius, -np.einsum("...ij,...j->...i", box.axes, direction)
 
 
 def _between_boxes(a: Placed, b: Placed) -> tuple[Floats, Floats]:
@@ -146,17 +146,18 @@ def _between_boxes(a: Placed, b: Placed) -> tuple[Floats, Floats]:
     assert isinstance(a.shape, Box)
     assert isinstance(b.shape, Box)
     apart = b.positions - a.positions
-    edges = np.cross(a.axes[:, :, :, None], b.axes[:, :, None, :], axis=1).reshape(len(apart), 3, 9)
-    axes = np.concatenate([a.axes, b.axes, edges], axis=2)
+    edges = np.cross(a.axes[:, :, :, None], b.axes[:, :, None, :], axis=1)
+    faces = np.broadcast_arrays(a.axes, b.axes)
+    axes = np.concatenate([*faces, edges.reshape(-1, 3, 9)], axis=2)
     norms = np.linalg.norm(axes, axis=1)
     # Edges that are parallel span no axis of their own.
     usable = norms > 1e-9
     axes = axes / np.where(usable, norms, 1.0)[:, None, :]
-    reach_a = np.einsum("tik,tij,j->tjk", axes, a.axes, np.array(a.shape.half_extents))
-    reach_b = np.einsum("tik,tij,j->tjk", axes, b.axes, np.array(b.shape.half_extents))
-    along = np.einsum("ti,tik->tk", apart, axes)
+    reach_a = np.einsum("...ik,...ij,j->...jk", axes, a.axes, np.array(a.shape.half_extents))
+    reach_b = np.einsum("...ik,...ij,j->...jk", axes, b.axes, np.array(b.shape.half_extents))
+    along = np.einsum("...i,...ik->...k", apart, axes)
     separation = np.abs(along) - np.abs(reach_a).sum(axis=1) - np.abs(reach_b).sum(axis=1)
     best = np.argmax(np.where(usable, separation, -np.inf), axis=1)
     rows = np.arange(len(apart))
-    normal = axes[rows, :, best] * np.where(along[rows, best] < 0, -1.0, 1.0)[:, None]
+    normal = axes[rows if len(axes) > 1 else 0, :, best] * np.where(along[rows, best] < 0, -1.0, 1.0)[:, None]
     return separation[rows, best], normal
