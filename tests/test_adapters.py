@@ -67,7 +67,7 @@ def at_wall(e, speed=1.0):
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("e", [0, 0.25, 0.5, 0.8, 0.9, 1])
 def test_tuned_restitution_is_exact(name, step, e):
-    """One-step impulses: only MuJoCo's vanishing stiffness (1e-12) and solver tolerance (1e-15) keep e from being exact.
+    """One-step impulses: only MuJoCo's tiny stiffness (1e-12) and solver tolerance (1e-15) keep e from being exact.
 
     MuJoCo's Newton solver leaves some 1e-12 of momentum at small steps; the others conserve it to round-off.
     """
