@@ -43,11 +43,12 @@ class Rigid:
         """Change of spin I^-1 (r x i) [rad/s] for moments of impulse [N m s], shape [3] or columns [3, n]."""
         if self.static:
             return np.zeros_like(moments)
-        return np.linalg.solve(self.inertia, moments)
+        return solve(self.inertia, moments)
 
     def contact_velocity(self) -> Floats:
         """v + w x r [m/s]."""
-        return self.velocity + np.cross(self.spin, self.arm)
+        velocity: Floats = self.velocity + np.cross(self.spin, self.arm)
+        return velocity
 
 
 Motion = tuple[Floats, Floats]
@@ -71,7 +72,8 @@ def rotation(orientation: Quaternion) -> Floats:
 def world_inertia(principal: Vector, orientation: Quaternion) -> Floats:
     """R diag(I_1, I_2, I_3) R^T [kg m^2]: principal moments along the body's own axes, seen in world axes."""
     axes = rotation(orientation)
-    return (axes * np.array(principal)) @ axes.T
+    inertia: Floats = (axes * np.array(principal)) @ axes.T
+    return inertia
 
 
 def parallel_axes(body: Rigid, offset: Floats) -> Floats:
@@ -83,6 +85,11 @@ def cross_matrix(vector: Sequence[float] | Floats) -> Floats:
     """[a] with [a] p = a x p."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def solve(matrix: Floats, right: Floats) -> Floats:
+    """x with `matrix` x = `right`, for one or more columns; backward stable, unlike a product with the inverse."""
+    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
 def closing_velocity(a: Rigid, b: Rigid) -> Floats:
@@ -107,7 +114,8 @@ def inverse_mass(a: Rigid, b: Rigid) -> Floats:
 
 def _inverse_mass(body: Rigid) -> Floats:
     arm = cross_matrix(body.arm)
-    return np.eye(3) / body.mass - arm @ body.turned_by(arm)
+    inverse: Floats = np.eye(3) / body.mass - arm @ body.turned_by(arm)
+    return inverse
 
 
 def apply_impulse(a: Rigid, b: Rigid, impulse_a: Floats) -> Motions:

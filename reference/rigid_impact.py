@@ -18,6 +18,7 @@ from impactbench.reference.rigid_body import (
     apply_impulse,
     closing_velocity,
     parallel_axes,
+    solve,
 )
 from impactbench.scenarios.trajectory import Floats
 
@@ -56,17 +57,19 @@ def inelastic(a: Rigid, b: Rigid) -> Motions:
     velocity = share_a * a.velocity + share_b * b.velocity
     centre_a, centre_b = -share_b * apart, share_a * apart
     momentum = _angular_momentum(a, centre_a, velocity) + _angular_momentum(b, centre_b, velocity)
-    spin = np.linalg.solve(parallel_axes(a, centre_a) + parallel_axes(b, centre_b), momentum)
+    spin = solve(parallel_axes(a, centre_a) + parallel_axes(b, centre_b), momentum)
     return (velocity + np.cross(spin, centre_a), spin), (velocity + np.cross(spin, centre_b), spin.copy())
 
 
 def _angular_momentum(body: Rigid, centre: Floats, common: Floats) -> Floats:
     """c x m (v - V) + I w [N m s], about the common centre of mass."""
-    return np.cross(centre, body.mass * (body.velocity - common)) + body.inertia @ body.spin
+    momentum: Floats = np.cross(centre, body.mass * (body.velocity - common)) + body.inertia @ body.spin
+    return momentum
 
 
 def bounce(a: Rigid, b: Rigid, normal: Floats, bounciness: float) -> Motions:
-    """v' and w' = b elastic + (1 - b) inelastic (R9 and R14): at the contact point u' = b (u + K i_elastic), u_n' = -b u_n.
+    """v' and w' = b elastic + (1 - b) inelastic (R9 and R14): at the contact point u' = b (u + K i_elastic), u_n' =
+    -b u_n.
 
     For balls that meet head-on without spin this is R9; at an angle it is not: the joined balls turn, where R8 stops
     their relative motion altogether.
