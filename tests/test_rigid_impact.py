@@ -193,7 +193,7 @@ def world_frame(orientation) -> np.ndarray:
     axis = np.array(orientation[1:])
     axis = axis / np.linalg.norm(axis) if np.any(axis) else np.array([0.0, 0.0, 1.0])
     cross = np.cross(np.eye(3), axis)
-    return np.eye(3) - math.sin(2 * half) * cross + (1 - math.cos(2 * half)) * cross @ cross
+    return np.eye(3) + math.sin(2 * half) * cross + (1 - math.cos(2 * half)) * cross @ cross
 
 
 @given(impacts(), vectors, vectors)
