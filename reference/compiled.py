@@ -7,6 +7,7 @@ store's folder is named after the text of all kernels.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar, cast
@@ -17,7 +18,15 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 HERE = Path(__file__).parent
 TEXT = b"".join(path.read_bytes() for path in sorted(HERE.glob("*.py")))
-STORE = Path(config.CACHE_DIR or HERE / "__pycache__") / f"kernels-{hashlib.sha256(TEXT).hexdigest()[:16]}"
+
+
+def _store() -> Path:
+    """The folder of compiled kernels: beside the package, or the user's cache where that cannot be written."""
+    beside = HERE / "__pycache__" if os.access(HERE, os.W_OK) else Path.home() / ".cache" / "impactbench"
+    return Path(config.CACHE_DIR or beside) / f"kernels-{hashlib.sha256(TEXT).hexdigest()[:16]}"
+
+
+STORE = _store()
 
 
 def compiled(kernel: Kernel) -> Kernel:

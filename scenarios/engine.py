@@ -1,4 +1,4 @@
-"""The contract between the harness and a contestant. An adapter is a class with this shape; nothing needs to be inherited."""
+"""The contract between the harness and a contestant: an adapter is a class with this shape and inherits nothing."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ class Unavailable(Exception):
 class Engine(Protocol):
     """One world, built for one cell.
 
-    The constructor takes (scene, law, profile, model, step): the scene's records, the law the run is scored under, the profile's name,
-    the model to build (`scene.model` or `FULL`) and the step [s]. It raises `Unsupported` or `Unavailable` with a reason.
+    The constructor takes (scene, law, profile, model, step): the scene's records, the law the run is scored under, the
+    profile's name, the model to build (`scene.model` or `FULL`) and the step [s]. It raises `Unsupported` or
+    `Unavailable` with a reason.
     """
 
     settings: Mapping[str, object]
@@ -33,7 +34,7 @@ class Engine(Protocol):
         """Advance by `steps` steps in as few calls as the engine offers; reads nothing."""
 
     def read(self) -> State:
-        """The movable bodies now, in scene order: copies, SI units, world axes. Spins and orientations only where modelled."""
+        """The movable bodies now, in scene order: copies, SI units, world axes; spins only where modelled."""
 
     def close(self) -> None:
         """Give back what the engine holds. The object is not used afterwards."""

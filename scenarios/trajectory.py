@@ -1,4 +1,4 @@
-"""What a run leaves behind: times, and the movable bodies' states at them. Every figure of the harness is computed from this."""
+"""What a run leaves behind: times and the movable bodies' states at them. All figures are computed from this."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Flags = NDArray[np.bool_]
 class State:
     """The movable bodies at one instant, in scene order.
 
-    positions [m] and velocities [m/s] of the centres of mass, shape [n, 3]; orientations as unit quaternions (w, x, y, z),
-    shape [n, 4], and spins [rad/s] in world axes, shape [n, 3], both None where rotation is not modelled.
+    positions [m] and velocities [m/s] of the centres of mass, shape [n, 3]; orientations as unit quaternions
+    (w, x, y, z), shape [n, 4], and spins [rad/s] in world axes, shape [n, 3], both None where rotation is not modelled.
     """
 
     positions: Floats

@@ -76,8 +76,7 @@ def test_a_folder_that_cannot_be_written_keeps_what_was_there(tmp_path: Path) ->
 
 
 def test_compare_measures_and_reports(tmp_path: Path) -> None:
-    done = impactbench(
-        "compare",
+    words = (
         "static_wall[bounciness=0.5]",
         "--engine",
         "reference",
@@ -85,14 +84,20 @@ def test_compare_measures_and_reports(tmp_path: Path) -> None:
         "1/60",
         "--step",
         "1/120",
-        "--out",
-        str(tmp_path),
+        "--phases",
+        "2",
     )
+    done = impactbench("compare", *words, "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     frame = load(tmp_path)
     errors = frame[frame.measure == "restitution_error"]
-    assert list(errors.step_text) == ["1/60", "1/120"]
+    assert sorted(zip(errors.step_text, errors.phase, strict=True)) == [
+        ("1/120", 0),
+        ("1/120", 0.5),
+        ("1/60", 0),
+        ("1/60", 0.5),
+    ]
     assert (errors.value.abs() < 1e-12).all()
     assert "static_wall" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
