@@ -1,0 +1,98 @@
+"""The exact runner: from event to event, without a step (Alder & Wainwright 1959; Lubachevsky 1991).
+
+Every sphere keeps its own time and its own next event. The earliest event of all is taken: if the partner has changed
+its motion since, the sphere looks again, else the impact is resolved and both look for their next.
+
+Impacts at one instant are taken one after the other, lowest sphere first, and again while any pair approaches: a
+corner hit is a hit on both walls. Where more than two spheres meet at one instant the outcome depends on that order;
+independent impacts do not, so only those are as symmetric as the scene.
+"""
+
+from __future__ import annotations
+
+from impactbench.reference.compiled import compiled
+from impactbench.reference.events_cells import cross
+from impactbench.reference.exact_impact import settle, strike_sphere, strike_wall
+from impactbench.reference.exact_predict import CELL, EDGE, SPHERE, fly, predict
+from impactbench.reference.exact_world import World
+
+REACHED, TOO_MANY, CROWDED, AT_EDGE = 0, 1, 2, 3
+"""How a run ends: at its time, at the bound of events, at impacts without end in one instant, at a box's edge."""
+
+CROWD = 1000
+"""Events of one sphere in one instant from which on they are taken to have no end."""
+
+
+@compiled
+def begin(world: World) -> None:
+    """Contacts with walls that neither approach nor leave at t = 0 are lasting ones (documents, rule R3)."""
+    s, walls, rules = world.spheres, world.walls, world.rules
+    for i in range(rules.movable):
+        for w in range(len(walls.level)):
+            gap, speed, pull = -walls.level[w] - s.radius[i], 0.0, 0.0
+            for k in range(3):
+                gap += s.position[i, k] * walls.normal[w, k]
+                speed += s.velocity[i, k] * walls.normal[w, k]
+                pull += rules.gravity[k] * walls.normal[w, k]
+            inside = (s.position[i] >= walls.low[w]).all() and (s.position[i] <= walls.high[w]).all()
+            s.rests[i, w] = inside and abs(gap) <= rules.touch and abs(speed) <= rules.rest and pull < 0.0
+        settle(world, i)
+    for i in range(rules.movable):
+        predict(world, i, 0.0)
+
+
+@compiled
+def run(world: World, until: float, most: int) -> tuple[int, float]:
+    """Process all events up to and at `until` [s], at most `most`. Returns how it ended, and the time of the end."""
+    queue = world.queue
+    for _ in range(most):
+        i = queue.heap[0]
+        now = queue.due[i]
+        if not now <= until:
+            return REACHED, until
+        outcome = process(world, i, now)
+        if outcome != REACHED:
+            return outcome, now
+    return TOO_MANY, queue.due[queue.heap[0]]
+
+
+@compiled
+def process(world: World, i: int, now: float) -> int:
+    """One event of sphere i."""
+    s = world.spheres
+    kind, partner = s.kind[i], s.partner[i]
+    if kind == EDGE:
+        return AT_EDGE
+    if kind == CELL:
+        cross(world.cells, i, partner)
+        predict(world, i, now)
+        return REACHED
+    if kind == SPHERE:
+        if s.partner_events[i] != s.events[partner]:
+            predict(world, i, now)
+            return REACHED
+        crowded = count_event(world, i, now)
+        crowded |= count_event(world, partner, now)
+        crowded |= strike_sphere(world, i, partner)
+        world.tally[0] += 1
+        if partner < world.rules.movable:
+            settle(world, partner)
+            predict(world, partner, now)
+    else:
+        crowded = count_event(world, i, now)
+        strike_wall(world, i, partner)
+        world.tally[1] += 1
+    settle(world, i)
+    predict(world, i, now)
+    return CROWDED if crowded else REACHED
+
+
+@compiled
+def count_event(world: World, i: int, now: float) -> bool:
+    """Bring sphere i to its event and count it. True if its events no longer get on in time."""
+    s = world.spheres
+    span = max(world.rules.instant, 4e-16 * now)
+    s.crowd[i] = s.crowd[i] + 1 if now - s.time[i] <= span else 0
+    s.events[i] += 1
+    fly(world, i, now)
+    return bool(s.crowd[i] > CROWD and s.inverse_mass[i] > 0.0)

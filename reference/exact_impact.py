@@ -1,0 +1,109 @@
+"""What an event does to velocities: impacts of spheres with one another and with walls, and rest on walls. Compiled.
+
+Frictionless under the law `nc`; under `doc` the impact shares tangential motion too (documents, rule R9).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from impactbench.reference.compiled import compiled
+from impactbench.reference.exact_world import World
+
+SWEEPS = 1000
+
+
+@compiled
+def strike_sphere(world: World, i: int, k: int) -> bool:
+    """Impact of two spheres: u' = b (u - 2 (u . n) n) (documents, rule R9) or u' = u - (1 + e) (u . n) n (Newton).
+
+    Written about the velocity V of the common centre of mass, which stays (rule R6): with u' = 0 both leave alike to
+    the last digit. Static spheres are the limit of an infinite mass (R13).
+
+    True if the pair stays in touch: one lies on the other, pressed by gravity, and no longer bounces.
+    """
+    s, b = world.spheres, world.rules.bounciness[world.spheres.group[i], world.spheres.group[k]]
+    x, v = s.position, s.velocity
+    n_x, n_y, n_z = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    distance = math.sqrt(n_x * n_x + n_y * n_y + n_z * n_z)
+    n = (n_x / distance, n_y / distance, n_z / distance)
+    along = (v[k, 0] - v[i, 0]) * n[0] + (v[k, 1] - v[i, 1]) * n[1] + (v[k, 2] - v[i, 2]) * n[2]
+    if along >= 0.0:
+        return False
+    share_i = s.inverse_mass[k] / (s.inverse_mass[i] + s.inverse_mass[k])
+    share_k = s.inverse_mass[i] / (s.inverse_mass[i] + s.inverse_mass[k])
+    pull = 0.0
+    for axis in range(3):
+        common = share_i * v[i, axis] + share_k * v[k, axis]
+        u = v[k, axis] - v[i, axis]
+        after = b * (u - 2.0 * along * n[axis]) if world.rules.doc else u - (1.0 + b) * along * n[axis]
+        v[i, axis] = common - share_k * after
+        v[k, axis] = common + share_i * after
+        pull += (s.acceleration[k, axis] - s.acceleration[i, axis]) * n[axis]
+    return bool(pull < 0.0 and -b * along <= world.rules.rest)
+
+
+@compiled
+def strike_wall(world: World, i: int, w: int) -> None:
+    """One-way impact: v' = b (v - 2 (v . n) n) (documents, rule R13) or v' = v - (1 + e) (v . n) n (Newton).
+
+    Bounces get shorter without end where b < 1 (Zeno). A sphere that leaves slower than `rest` [m/s] and is pressed
+    back by gravity is at rest on the wall; the bounces left out rise less than rest^2/(2 a). Without a pressing gravity
+    it must not leave at all.
+    """
+    s, n, rules = world.spheres, world.walls.normal[w], world.rules
+    b = rules.bounciness[s.group[i], world.walls.group[w]]
+    v = s.velocity[i]
+    along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+    for k in range(3):
+        v[k] = b * (v[k] - 2.0 * along * n[k]) if rules.doc else v[k] - (1.0 + b) * along * n[k]
+    pull = rules.gravity[0] * n[0] + rules.gravity[1] * n[1] + rules.gravity[2] * n[2]
+    slow = rules.rest if pull < 0.0 and b < 1.0 else rules.still
+    s.rests[i, w] = pull <= 0.0 and -b * along <= slow
+
+
+@compiled
+def settle(world: World, i: int) -> None:
+    """After a change of velocity: which walls the sphere still rests on, and the acceleration they leave it.
+
+    A wall only pushes: a = g + sum of p_w n_w with p_w >= 0 and a . n_w >= 0, by sweeps over the walls it rests on.
+    """
+    s, walls, rules = world.spheres, world.walls, world.rules
+    v, a = s.velocity[i], s.acceleration[i]
+    resting = False
+    for w in range(len(walls.level)):
+        if s.rests[i, w]:
+            n = walls.normal[w]
+            along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+            s.rests[i, w] = abs(along) <= rules.rest
+            resting |= s.rests[i, w]
+            if s.rests[i, w]:
+                for k in range(3):
+                    v[k] -= along * n[k]
+    a[:] = rules.gravity
+    if resting:
+        press(world, i)
+
+
+@compiled
+def press(world: World, i: int) -> None:
+    s, walls = world.spheres, world.walls
+    a, push = s.acceleration[i], np.zeros(len(walls.level))
+    small = 1e-15 * math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    for _ in range(SWEEPS):
+        worst = 0.0
+        for w in range(len(push)):
+            if s.rests[i, w]:
+                n = walls.normal[w]
+                total = max(0.0, push[w] - (a[0] * n[0] + a[1] * n[1] + a[2] * n[2]))
+                for k in range(3):
+                    a[k] += (total - push[w]) * n[k]
+                worst = max(worst, abs(total - push[w]))
+                push[w] = total
+        if worst <= small:
+            break
+    for w in range(len(push)):
+        if s.rests[i, w] and push[w] == 0.0:
+            n = walls.normal[w]
+            s.rests[i, w] = a[0] * n[0] + a[1] * n[1] + a[2] * n[2] <= small
