@@ -32,6 +32,8 @@ try:
 except ImportError as error:
     raise Unavailable(f"mujoco cannot be imported: {error}") from error
 
+INTEGRATORS = {"tuned": "Euler", "implicit": "implicit", "implicitfast": "implicitfast", "rk4": "RK4"}
+"""By profile. The last three are for `reproduce`, of flights: one-step impacts need a step of one stage."""
 RIGID = "0.9999 0.9999 0.001 0.5 2"
 """solimp: constant impedance, or e would depend on depth."""
 LOST = (mj.mjtWarning.mjWARN_BADQPOS, mj.mjtWarning.mjWARN_BADQVEL, mj.mjtWarning.mjWARN_BADQACC)
@@ -41,7 +43,7 @@ FULL_BUFFERS = (mj.mjtWarning.mjWARN_CONTACTFULL, mj.mjtWarning.mjWARN_CNSTRFULL
 class MuJoCo:
     def __init__(self, scene: Scene, law: Law, profile: str, model: Model, step: float) -> None:
         self._scene, self._model, self._h = scene, model, step
-        self._tuned = profile == "tuned"
+        self._tuned, self._integrator = profile in INTEGRATORS, INTEGRATORS.get(profile, "Euler")
         self._rates = viscous_rates(scene, law, profile)
         self._axes = moving_axes(scene, model)
         self._pairs = can_meet(scene, self._axes)
@@ -110,7 +112,8 @@ class MuJoCo:
         flag = ""
         if self._tuned:
             # RK4 solves a damped slide to 1e-11, but its stages spoil one-step impacts.
-            chosen = {"integrator": "RK4" if self._rates else "Euler", "cone": "elliptic", "tolerance": "1e-15"}
+            integrator = "RK4" if self._rates else self._integrator
+            chosen = {"integrator": integrator, "cone": "elliptic", "tolerance": "1e-15"}
             option |= chosen
             self._settings |= chosen | {"autoreset": "disable"}
             flag = '<flag autoreset="disable"/>'

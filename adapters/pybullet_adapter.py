@@ -39,6 +39,9 @@ EXACT = {
 # Push overlaps apart without adding velocity: split impulses exist in maximal coordinates only, else no push at all.
 MAXIMAL = EXACT | {"useSplitImpulse": 1, "splitImpulsePenetrationThreshold": 0.0}
 REDUCED = EXACT | {"contactERP": 0.0, "erp": 0.0}
+# Profiles of published benchmarks, for `reproduce` only: the coordinates by name, and overlaps are left alone.
+PUBLISHED = {"maximal": True, "multibody": False}
+UNPUSHED = {"erp": 0.0, "contactERP": 0.0, "frictionERP": 0.0}
 SURFACE = {"linearDamping": 0.0, "angularDamping": 0.0, "contactProcessingThreshold": 0.0}
 
 
@@ -56,7 +59,8 @@ class Bullet:
         rough = surface_factors(scene, pairs, lambda c: c.friction if model.friction and not self._rates else 0.0)
         self._c = c = _client()
         self._rotation = model.rotation
-        self._tuned = profile == "tuned"
+        self._published = PUBLISHED.get(profile)
+        self._tuned = profile == "tuned" or self._published is not None
         self._settings: dict[str, object] = {"combination": "product of surfaces"}
         self._maximal, self._locked = self._coordinates(scene, model, pairs) if self._tuned else (False, False)
         pb.resetSimulation(c)
@@ -96,6 +100,8 @@ class Bullet:
 
     def _coordinates(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> tuple[bool, bool]:
         """(maximal, rotation locked): only reduced coordinates can lock rotation, only maximal ones split impulses."""
+        if self._published is not None:
+            return self._published, False
         if self._rates:
             return True, False  # the damping of reduced coordinates is quadratic in speed
         wanted = need(scene, model, distinct_contacts(scene, pairs))
@@ -110,12 +116,14 @@ class Bullet:
 
     def _tune(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> None:
         chosen: dict[str, float | int] = dict(MAXIMAL if self._maximal else REDUCED)
-        resting = need(scene, model, distinct_contacts(scene, pairs)) == "resting"
+        resting = self._published is None and need(scene, model, distinct_contacts(scene, pairs)) == "resting"
         if not self._maximal and (resting or not self._locked):
             chosen = dict(EXACT)  # piles, and boxes free to tip, need overlaps pushed out: else they sink
         if self._rates:
             # A box in maximal coordinates rocks on its floor; pushes that add velocity hold it up best (measured).
             chosen = EXACT | {"useSplitImpulse": 0}
+        if self._published is not None:
+            chosen = dict(UNPUSHED)
         if resting:
             chosen["numSolverIterations"] = 200
         pb.setPhysicsEngineParameter(**chosen, physicsClientId=self._c)

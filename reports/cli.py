@@ -222,11 +222,76 @@ def run(
         sys.exit(NOTHING_MEASURED)
 
 
+@main.command()
+@click.argument("engine")
+def conform(engine: str) -> None:
+    """Try ENGINE against the engine contract, point by point.
+
+    ENGINE is an engine (mujoco), a contestant (mujoco/tuned), FILE.py:Class or an installed engine's name. Exit code 1:
+    a point fails; 3: an engine could not be run.
+    """
+    contestants = _contestants([engine], "both")
+
+    from impactbench.reports import conform as contract
+
+    verdicts = contract.conform(contestants)
+    click.echo("\n".join(contract.lines(verdicts)))
+    sys.exit(contract.exit_code(verdicts))
+
+
+@main.command()
+@click.argument("case")
+def show(case: str) -> None:
+    """Show a case: bodies, coefficients, truth, scales and a sketch of the start."""
+    chosen = _cases([case])
+    if len(chosen) != 1:
+        names = [c.scene.name for c in chosen]
+        raise click.UsageError(f"show takes one case; {case} is {len(names)}: {', '.join(names)}")
+
+    from impactbench.reports.picture import describe
+
+    click.echo(describe(chosen[0]))
+
+
+@main.command()
+@click.argument("names", nargs=-1, metavar="[NAME ...]")
+@click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Runs at once. Default: cores.")
+@click.option("--json", "as_json", is_flag=True, help="Print the rows as JSON.")
+def reproduce(names: tuple[str, ...], jobs: int, as_json: bool) -> None:
+    """Reproduce figures that others published of engines, through the ordinary adapters.
+
+    NAME is a benchmark (bouncing), its project (SimBenchmark), an engine or contestant (mujoco/rk4) or a glob; none
+    means all. Exit code 1: a figure disagrees; 3: one could not be measured.
+    """
+    from impactbench.reports import reproduce as reproduction
+
+    try:
+        entries = reproduction.plan(names)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    with _progress() as progress:
+        rows = reproduction.reproduce(entries, jobs, progress)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(reproduction.as_json(rows), indent=1, allow_nan=False))
+    else:
+        click.echo(reproduction.text(rows))
+    sys.exit(reproduction.exit_code(rows))
+
+
 @main.command("list")
 @click.argument("what", type=click.Choice(["scenarios", "engines", "all"]), default="all")
-def list_(what: str) -> None:
+@click.option("--pair-laws", is_flag=True, help="Measure how each engine combines the coefficients of two surfaces.")
+def list_(what: str, pair_laws: bool) -> None:
     """List scenarios and engines, with what is available here."""
     from impactbench.reports import terminal
+
+    if pair_laws:
+        from impactbench.reports.pair_laws import measured_laws
+
+        click.echo(terminal.pair_law_table(measured_laws()))
+        return
 
     parts: dict[str, Callable[[], str]] = {"scenarios": terminal.scenario_table, "engines": terminal.engine_table}
     click.echo("\n".join(parts[name]() for name in parts if what in (name, "all")))
