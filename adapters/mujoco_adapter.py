@@ -119,6 +119,7 @@ class MuJoCo:
             flag = '<flag autoreset="disable"/>'
         else:
             self._settings["restitution"] = "none in MuJoCo; default solref (0.02, 1)"
+            self._settings["cone"] = "not set (pyramidal: friction depends on the heading)"
         listed = (self._tuned and self._need == "sliding") or len(self._contacts) > 1
         listed = listed or (self._tuned and self._rough() and self._need == "impacts")
         self._settings["coefficients"] = "per pair" if listed else "per geom (all pairs are alike)"

@@ -42,6 +42,13 @@ REDUCED = EXACT | {"contactERP": 0.0, "erp": 0.0}
 # Profiles of published benchmarks, for `reproduce` only: the coordinates by name, and overlaps are left alone.
 PUBLISHED = {"maximal": True, "multibody": False}
 UNPUSHED = {"erp": 0.0, "contactERP": 0.0, "frictionERP": 0.0}
+LEFT_ALONE = {
+    "contactProcessingThreshold": "not set: contacts act before bodies touch, at the cost of bounce off a static",
+    "contactERP": "not set (0.08): pushes overlaps out with velocity, which adds to the bounce of two balls",
+    "linearDamping, angularDamping": "not set (0.04): slows free motion",
+    "useMaximalCoordinates": "not set (reduced coordinates)",
+}
+"""The vendor's defaults that cause what the default profile shows."""
 SURFACE = {"linearDamping": 0.0, "angularDamping": 0.0, "contactProcessingThreshold": 0.0}
 
 
@@ -63,6 +70,8 @@ class Bullet:
         self._tuned = profile == "tuned" or self._published is not None
         self._settings: dict[str, object] = {"combination": "product of surfaces"}
         self._maximal, self._locked = self._coordinates(scene, model, pairs) if self._tuned else (False, False)
+        if not self._tuned:
+            self._settings |= LEFT_ALONE
         pb.resetSimulation(c)
         pb.setTimeStep(step, c)
         pb.setGravity(*gravity_of(scene, model), c)
