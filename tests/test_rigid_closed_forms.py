@@ -1,4 +1,4 @@
-"""Rule R14 against closed forms derived here line by line, its limits, its relation to R7-R9, and the catalogue."""
+"""Rule R14 against closed forms derived here line by line, its limits, and its relation to R7-R9."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ from impactbench.reference.rigid_body import (
     static,
     world_inertia,
 )
-from impactbench.scenarios import rigid, rolling
-from impactbench.scenarios.records import Sphere
-from impactbench.scenarios.truth import Case
 from test_rigid_impact import (
     ROUND,
     after,
@@ -57,8 +54,7 @@ def ball(mass: float, radius: float, velocity, spin, arm) -> Rigid:
 
 @given(rotations())
 def test_a_quaternion_turns_by_its_angle_about_its_axis(orientation):
-    # acos loses half the digits near a half angle of 0: compared to sqrt(eps), which no wrong sign or factor passes.
-    assert np.abs(rotation(orientation) - world_frame(orientation)).max() < 1e-7
+    assert close(rotation(orientation), world_frame(orientation), 4)
 
 
 @given(rotations(), vectors)
@@ -209,48 +205,3 @@ def test_a_falling_rod_turns_about_its_end(angle):
     elastic = rigid_newton.restitution(static(0 * X), rod, Z, 1.0)[1]
     for b in (0.0, 0.5, 1.0):
         assert np.array(rigid_impact.bounce(static(0 * X), rod, Z, b)[1]) == near(b * np.array(elastic))
-
-
-# The catalogue's truths, from the scenes alone
-
-
-def contact(case: Case, time: float) -> tuple[Rigid, Rigid, np.ndarray]:
-    """A, B and n at the impact: a ball or the rod's end touches its partner along x, or the floor along z."""
-    state = case.truths[case.scene.laws[0]].state(time - 1e-12)
-    assert state is not None
-    assert state.orientations is not None
-    n = Z if case.scene.statics else X
-    moving = [case.scene.bodies[i] for i in case.scene.movable]
-    balls = [i for i, body in enumerate(moving) if isinstance(body.shape, Sphere)]
-    if balls:
-        point = state.positions[balls[0]] + moving[balls[0]].shape.radius * (-n if case.scene.statics else n)
-    else:
-        axis = rotation(tuple(state.orientations[0]))[:, 2]
-        point = state.positions[0] - moving[0].shape.half_length * axis - moving[0].shape.radius * n
-    rigids = [
-        Rigid(
-            x.mass,
-            world_inertia(x.principal_inertia(), tuple(state.orientations[i])),
-            state.velocities[i],
-            np.array(x.spin),
-            point - state.positions[i],
-        )
-        for i, x in enumerate(moving)
-    ]
-    return (*([static(0 * X)] if case.scene.statics else []), *rigids, n)
-
-
-def test_the_catalogue_agrees():
-    families = {f.name: f for f in (*rigid.FAMILIES, *rolling.FAMILIES)}
-    for name in ("rigid_offset_hit", "rod_drop", "oblique_friction_impact"):
-        for case in families[name].cases():
-            for law, truth in case.truths.items():
-                a, b, n = contact(case, truth.impact_times[0])
-                e, mu = case.scene.contact.bounciness, case.scene.contact.friction
-                respond = rigid_impact.bounce if law == "doc" else rigid_newton.restitution
-                motions = respond(a, b, n, e, *([mu] if law == "nc" else []))
-                after_impact = [m for x, m in zip((a, b), motions, strict=True) if not x.static]
-                state = truth.state(truth.impact_times[0])
-                found, expected = np.array(after_impact), np.stack((state.velocities, state.spins), axis=1)
-                # The state before is taken 1e-12 s early: arms differ by some 1e-12 m.
-                assert found == pytest.approx(expected, abs=1e-10), (case.scene.name, law)

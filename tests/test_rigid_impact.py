@@ -189,9 +189,11 @@ def test_rotating_or_mirroring_changes_only_the_frame(case, orientation, mirror)
 
 def world_frame(orientation) -> np.ndarray:
     """Axes by Rodrigues' formula, not by the quaternion's matrix."""
-    half = math.acos(max(-1.0, min(1.0, orientation[0])))
     axis = np.array(orientation[1:])
-    axis = axis / np.linalg.norm(axis) if np.any(axis) else np.array([0.0, 0.0, 1.0])
+    length = math.hypot(*axis)
+    if length < 1e-100:
+        return np.eye(3)
+    half, axis = math.atan2(length, orientation[0]), axis / length
     cross = np.cross(np.eye(3), axis)
     return np.eye(3) + math.sin(2 * half) * cross + (1 - math.cos(2 * half)) * cross @ cross
 
