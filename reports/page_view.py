@@ -138,7 +138,8 @@ class View:
         """One family: the chart of one of its cases and the tables of all."""
         drawable = self.rungs[self.rungs["error"].notna() & self.rungs["cost"].notna() & (self.rungs["state"] == "ok")]
         charted = [name for name in names if (drawable["case"] == name).any()]
-        name = featured if featured in names else (charted or names)[0]
+        timed = [name for name in charted if drawable.loc[drawable["case"] == name, "timed"].any()]
+        name = featured if featured in names else (timed or charted or names)[0]
         case = self.cases[name]
         points = drawable[drawable["case"] == name]
         chart = self.chart(f"chart-{index}", case, points) if len(points) and index < MAX_CHARTS else None
@@ -150,6 +151,7 @@ class View:
             "unit": self.units.get(case["headline"], "1"),
             "chart": chart,
             "reach": self.reach(name),
+            "phases": len({cell["phase"] for cell in self.document["cells"] if cell["case"] == name}),
             "orders": {policy: order(line) for policy, line in self.of(name).items()},
             "measures": self.measure_table(name),
             "data": points.sort_values(["policy", "step"]).to_dict("records"),
