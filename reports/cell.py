@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 from impactbench.adapters.contestants import Contestant
-from impactbench.reports.measures import Figure, measure
-from impactbench.scenarios import catalogue
+from impactbench.reports.measures import Figure, measure, self_consistency
+from impactbench.scenarios import catalogue, scene_file
 from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
 from impactbench.scenarios.records import FULL, Law, Scene, shifted
 from impactbench.scenarios.trajectory import Floats, State, Trajectory
@@ -24,7 +24,7 @@ from impactbench.scenarios.truth import Case
 @dataclass(frozen=True)
 class Cell:
     """What identifies a cell. `step` is text such as 1/240, so that it names the same number everywhere; `phase` is
-    in steps.
+    in steps. `scene` is what a scene file said; a child knows the catalogue's cases by name.
     """
 
     case: str
@@ -33,6 +33,7 @@ class Cell:
     model: str
     step: str
     phase: float = 0.0
+    scene: Scene | None = None
 
     @property
     def step_seconds(self) -> float:
@@ -60,18 +61,25 @@ def case_named(name: str) -> Case:
     return case
 
 
+def case_of(cell: Cell) -> Case:
+    """The cell's case: that of its own scene, else the catalogue's."""
+    return case_named(cell.case) if cell.scene is None else scene_file.case_of(cell.scene)
+
+
 def step_count(scene: Scene, step: float) -> int:
     """Steps that reach the scene's end: as many as fit, to half a round-off of their number."""
     return max(1, round(scene.duration / step))
 
 
-def build(cell: Cell, contestant: Contestant) -> Engine:
-    """The contestant's world for this cell. Raises Unsupported or Unavailable with a reason."""
-    scene = case_named(cell.case).scene
+def build(cell: Cell, contestant: Contestant, halving: int = 1) -> Engine:
+    """The contestant's world for this cell, its step divided by `halving`. Raises Unsupported or Unavailable with a
+    reason.
+    """
+    scene = case_of(cell).scene
     if cell.phase:
         scene = shifted(scene, cell.phase * cell.step_seconds)
     model = scene.model if cell.model == "minimal" else FULL
-    engine: Engine = contestant.load()(scene, cell.law, contestant.profile, model, cell.step_seconds)
+    engine: Engine = contestant.load()(scene, cell.law, contestant.profile, model, cell.step_seconds / halving)
     return engine
 
 
@@ -85,7 +93,7 @@ def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
     except Unavailable as why:
         return {"state": "unavailable", "reason": str(why)}
     try:
-        case = case_named(cell.case)
+        case = case_of(cell)
         trajectory = record(engine, cell.step_seconds, step_count(case.scene, cell.step_seconds))
         settings = {name: _plain(value) for name, value in engine.settings.items()}
     finally:
@@ -95,17 +103,28 @@ def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
     # A state that is finite yet absurd overflows in the measures: that run has diverged too.
     with np.errstate(over="ignore", invalid="ignore"):
         figures = measure(case, cell.law, trajectory, cell.phase * cell.step_seconds)
+        if case.from_file:
+            figures += self_consistency(case.scene, trajectory, _halved(cell, contestant))
     if not all(math.isfinite(figure.value) for figure in figures):
         bad = next(figure.measure for figure in figures if not math.isfinite(figure.value))
         return {"state": "diverged", "reason": f"{bad} is not finite", "settings": settings}
     return {"state": "ok", "reason": "", "settings": settings, "figures": figures}
 
 
-def record(engine: Engine, step: float, count: int) -> Trajectory:
-    """The state at every step, so that no maximum is missed between samples."""
+def _halved(cell: Cell, contestant: Contestant) -> Trajectory:
+    """The same cell at half the step, read at the same times."""
+    engine = build(cell, contestant, 2)
+    try:
+        return record(engine, cell.step_seconds, step_count(case_of(cell).scene, cell.step_seconds), 2)
+    finally:
+        engine.close()
+
+
+def record(engine: Engine, step: float, count: int, every: int = 1) -> Trajectory:
+    """The state at every step, so that no maximum is missed between samples; `every` of the engine's make one here."""
     states = [engine.read()]
     for _ in range(count):
-        engine.advance(1)
+        engine.advance(every)
         states.append(engine.read())
     return stack(np.arange(count + 1) * np.float64(step), states)
 
@@ -154,7 +173,7 @@ def time_cells(argument: tuple[Sequence[tuple[Cell, Contestant]], int]) -> dict[
 def _time_once(cell: Cell, contestant: Contestant) -> float | None:
     engine = build(cell, contestant)
     step = cell.step_seconds
-    count = step_count(case_named(cell.case).scene, step)
+    count = step_count(case_of(cell).scene, step)
     gc.disable()
     try:
         start = time.perf_counter()

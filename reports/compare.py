@@ -68,13 +68,19 @@ class Plan:
         """In an order that keeps an engine's cells together."""
         timed = self.timed()
         return [
-            (Cell(case.scene.name, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
+            (cell_of(case, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
             for contestant in self.contestants
             for case in self.cases
             for model in self.models
             for phase in (self.phases if case.scene.phase_free and case.scene.name in timed else self.phases[:1])
             for step in self.steps
         ]
+
+
+def cell_of(case: Case, law: Law, contestant: str, model: str, step: str, phase: float) -> Cell:
+    """A child gets the scene itself where its catalogue does not hold it: the file is read once."""
+    scene = case.scene if case.from_file else None
+    return Cell(case.scene.name, law, contestant, model, step, phase, scene)
 
 
 def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:

@@ -160,6 +160,23 @@ def _penetration(scene: Scene, pairs: list[PairHistory]) -> Iterator[Figure]:
     yield Figure("penetration_final", float(depth[-1]))
 
 
+AGREEMENT = 0.01
+"""Two runs agree while they differ by less than this part of the scene's length."""
+
+
+def self_consistency(scene: Scene, run: Trajectory, finer: Trajectory) -> list[Figure]:
+    """How far a run is from the same engine's at half the step, and the part of the duration up to which they agree.
+
+    It needs no truth, and cannot see a model that is wrong at every step alike.
+    """
+    if not finer.finite():
+        return [Figure("self_error", math.inf)]
+    distances = np.linalg.norm(run.positions - finer.positions, axis=2).max(axis=1) / scene.length
+    apart = np.flatnonzero(distances > AGREEMENT)
+    horizon = float(run.times[apart[0]] / run.times[-1]) if len(apart) else 1.0
+    return [Figure("self_error", float(distances.max())), Figure("self_horizon", horizon)]
+
+
 def law_difference(case: Case) -> list[Figure]:
     """Distance between the two truths at the end of the run: a property of the laws, no contestant's error."""
     if not {"doc", "nc"} <= set(case.truths):

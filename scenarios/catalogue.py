@@ -6,8 +6,11 @@ import difflib
 import re
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 
 from impactbench.scenarios import flight, gravity_drops, lines, pairs, rigid, rolling, sliding, walls
+from impactbench.scenarios.scene_file import is_scene_file, read_case
+from impactbench.scenarios.scene_values import SceneError, printable
 from impactbench.scenarios.truth import Case, Family
 
 FAMILIES: dict[str, Family] = {
@@ -43,13 +46,32 @@ def select(patterns: Sequence[str] = ()) -> list[Case]:
     """The cases that any pattern names, in the order of the catalogue; no pattern means all.
 
     A pattern is a family's name, a case's name, or either with * and ? in it.
-    Brackets stand for themselves, as case names hold them.
+    Brackets stand for themselves, as case names hold them. A pattern that ends in .toml, .xml or .urdf is the path of a
+    scene file; such cases come last.
     """
+    files = [pattern for pattern in patterns if is_scene_file(pattern)]
+    if files:
+        named = [pattern for pattern in patterns if not is_scene_file(pattern)]
+        return [*(select(named) if named else []), *_read(files)]
     matchers = [_matcher(pattern) for pattern in patterns]
     for pattern, matcher in zip(patterns, matchers, strict=True):
         if not any(_named(case, matcher) for case in _catalogue()):
             raise UnknownCase(_complaint(pattern))
     return [c for c in _catalogue() if not matchers or any(_named(c, m) for m in matchers)]
+
+
+def _read(files: Sequence[str]) -> list[Case]:
+    """The files' cases. Names must tell results apart."""
+    cases: dict[str, Case] = {}
+    for file in dict.fromkeys(files):
+        case = read_case(file)
+        name, family = case.scene.name, case.scene.family
+        if not family or family in FAMILIES:
+            raise SceneError(f"{printable(Path(file).name)}: name {name!r} is kept for the catalogue; choose another")
+        if name in cases:
+            raise SceneError(f"{printable(Path(file).name)}: another of these scene files is named {name!r} too")
+        cases[name] = case
+    return list(cases.values())
 
 
 def _matcher(pattern: str) -> re.Pattern[str]:

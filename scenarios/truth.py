@@ -34,6 +34,8 @@ class Case:
     scene: Scene
     truths: Mapping[Law, Truth]
     headline: str = "position_error"
+    from_file: bool = False
+    """Whether a scene file describes it: the catalogue then does not know its name."""
 
 
 @dataclass(frozen=True, eq=False)
