@@ -70,17 +70,39 @@ CONTESTANTS = (
 )
 
 
+GROUP = "impactbench.engines"
+"""Entry points of this group are engines that other installed packages offer."""
+HINT = "installed; takes part when asked for by name"
+
+
+def installed() -> tuple[Contestant, ...]:
+    """Engines of installed packages, each `NAME/default`; from metadata alone. A name of ours stays ours."""
+    points = importlib.metadata.entry_points(group=GROUP)
+    return tuple(
+        Contestant(point.name, "default", f"{point.module}:{point.attr}", point.dist.name if point.dist else "")
+        for point in sorted(points, key=lambda point: point.name)
+        if point.name not in _distinct("engine")
+    )
+
+
 def select(engines: Sequence[str] = (), profiles: Sequence[str] = ()) -> tuple[Contestant, ...]:
     """The contestants that match one of `engines` and one of `profiles`; an empty filter lets all pass.
 
     `engines` holds engines ("mujoco"), contestants ("mujoco/tuned"), globs of either, or a user's own engine
-    ("file.py:Name", "module:Name"), which becomes `Name/default` and passes whatever the profiles.
+    ("file.py:Name", "module:Name"), which becomes `Name/default`, or the name of an installed one (see `installed`);
+    these pass whatever the profiles, and only when asked for.
     """
     own = [_own(text) for text in engines if ":" in text]
     filters = [text for text in engines if ":" not in text]
     for text in filters:
-        if not any(_matches(contestant, text) for contestant in CONTESTANTS):
-            raise _unknown("contestant", text, [*_distinct("engine"), *_distinct("name")])
+        if any(_matches(contestant, text) for contestant in CONTESTANTS):
+            continue
+        others = installed()
+        named = [contestant for contestant in others if text in (contestant.engine, contestant.name)]
+        if not named:
+            known = [*_distinct("engine"), *_distinct("name"), *(contestant.engine for contestant in others)]
+            raise _unknown("contestant", text, known)
+        own += named
     for text in profiles:
         if not any(fnmatchcase(contestant.profile, text) for contestant in CONTESTANTS):
             raise _unknown("profile", text, _distinct("profile"))
