@@ -223,6 +223,53 @@ def run(
 
 
 @main.command()
+@click.argument("case")
+@click.option("--error", "text", default="1%", show_default=True, help="Largest error allowed: 1% or 0.01.")
+@click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
+@click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
+@click.option("--step", "steps", multiple=True, callback=_steps, help=STEP_HELP)
+@click.option(
+    "--phases", type=click.IntRange(1, 64), default=8, show_default=True, help="Impact phases tried per step."
+)
+def advise(case: str, text: str, engines: tuple[str, ...], profile: str, steps: tuple[str, ...], phases: int) -> None:
+    """Say which step each contestant may take on CASE to stay below an error, and what it costs."""
+    chosen, contestants = _cases([case]), _contestants(engines, profile)
+    if len(chosen) != 1:
+        raise click.UsageError(f"advise takes one case; {case} is {', '.join(c.scene.name for c in chosen)}")
+
+    from impactbench.reports.advise import advice, target_of
+    from impactbench.reports.compare import LADDER, Plan
+    from impactbench.reports.compare import compare as run_comparison
+
+    try:
+        target = target_of(text)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    shifts = tuple(k / phases for k in range(phases))
+    plan = Plan(chosen, contestants, steps or LADDER, phases=shifts, jobs=os.cpu_count() or 1, timing="all")
+    with _progress() as progress:
+        document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
+    click.echo(advice(document, target))
+    if not any(cell["state"] == "ok" for cell in document["cells"]):
+        sys.exit(NOTHING_MEASURED)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+def report(folder: Path) -> None:
+    """Render FOLDER/report.html again from FOLDER/results.json."""
+    from impactbench.reports import page, results
+
+    try:
+        page.write_page(results.read(folder / "results.json"), folder / "report.html")
+    except results.ResultsError as error:
+        raise click.UsageError(str(error)) from None
+    except OSError as error:
+        raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
+    click.echo(f"report: {folder / 'report.html'}")
+
+
+@main.command()
 @click.argument("engine")
 def conform(engine: str) -> None:
     """Try ENGINE against the engine contract, point by point.
@@ -285,16 +332,17 @@ def reproduce(names: tuple[str, ...], jobs: int, as_json: bool) -> None:
 @click.option("--pair-laws", is_flag=True, help="Measure how each engine combines the coefficients of two surfaces.")
 def list_(what: str, pair_laws: bool) -> None:
     """List scenarios and engines, with what is available here."""
+    if pair_laws and what == "scenarios":
+        raise click.UsageError("--pair-laws is about engines: list engines --pair-laws")
+
     from impactbench.reports import terminal
-
-    if pair_laws:
-        from impactbench.reports.pair_laws import measured_laws
-
-        click.echo(terminal.pair_law_table(measured_laws()))
-        return
 
     parts: dict[str, Callable[[], str]] = {"scenarios": terminal.scenario_table, "engines": terminal.engine_table}
     click.echo("\n".join(parts[name]() for name in parts if what in (name, "all")))
+    if pair_laws:
+        from impactbench.reports.pair_laws import measured_laws
+
+        click.echo("\n" + terminal.pair_law_table(measured_laws()))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from impactbench.adapters.contestants import CONTESTANTS, Contestant
 from impactbench.adapters.isolation import Job, Outcome, run_jobs
 from impactbench.reports.cell import record, step_count
 from impactbench.reports.conservation import energies, spin_momenta
-from impactbench.reports.terminal import _table
+from impactbench.reports.terminal import table
 from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
 from impactbench.scenarios.published import BENCHMARKS, DIGITS, UNITS, Benchmark, Cell, Measure, cells, half_step
 from impactbench.scenarios.trajectory import Floats, Trajectory
@@ -231,7 +231,8 @@ COLUMNS = ("engine then", "step [s]", "measure", "now", "published", "measured",
 NOTE = """\
 digits: leading digits agreed to half a unit of the last; six were published, {required} are required.
 half-step offset: what semi-implicit Euler scores with perfect impacts. It keeps E - (1/2) m g h v, not E; over elastic
-bounces the mean square of the difference is (1/2 M g h)^2 2 g (H - R)/3. Positions are off by g h T/2."""
+bounces the mean square of the difference is (1/2 M g h)^2 2 g (H - R)/3. In flight positions are off by g h T/2, the
+energy by m g^2 h T/2."""
 
 
 def text(rows: Sequence[Row]) -> str:
@@ -241,7 +242,7 @@ def text(rows: Sequence[Row]) -> str:
         mine = [row for row in rows if row.cell.benchmark is benchmark]
         if mine:
             head = f"{benchmark.name}: {benchmark.project} ({benchmark.year}), {benchmark.table}\n{benchmark.question}"
-            parts += [head, _table(COLUMNS, map(_shown, mine), right=4)]
+            parts += [head, table(COLUMNS, map(_shown, mine), right=4)]
     failed = [f"{row.contestant}: {row.state} ({row.reason})" for row in rows if row.state != "ok"]
     parts += ["\n".join(dict.fromkeys(failed))] if failed else []
     return "\n\n".join([*parts, NOTE.format(required=REQUIRED), _verdict(rows)])

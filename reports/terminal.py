@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -13,13 +14,14 @@ from rich.console import Console
 from rich.table import Table
 
 
-def _text(table: Table, width: int = 110) -> str:
+def _text(table: Table) -> str:
     stream = io.StringIO()
+    width = max(shutil.get_terminal_size((150, 24)).columns, 80)
     Console(file=stream, width=width, no_color=True, highlight=False).print(table)
     return "\n".join(line.rstrip() for line in stream.getvalue().splitlines())
 
 
-def _table(columns: Iterable[str], rows: Iterable[Sequence[str]], right: int = 99) -> str:
+def table(columns: Iterable[str], rows: Iterable[Sequence[str]], right: int = 99) -> str:
     """Columns from number `right` on hold figures and are set flush right."""
     table = Table(box=None, pad_edge=False)
     for number, column in enumerate(columns):
@@ -57,7 +59,7 @@ def summary(document: dict[str, Any]) -> str:
         shown = [f"{figure[0]:.2g}" if figure else "-" for figure in figures]
         rows.append([name, str(counts["ok"]), others, *shown, figures[0][1] if figures[0] else "-"])
     columns = ["contestant", "ok", "other cells", "worst error", "energy gain", "momentum", "worst error in"]
-    return _table(columns, rows)
+    return table(columns, rows)
 
 
 def cell_table(document: dict[str, Any]) -> str:
@@ -70,9 +72,9 @@ def cell_table(document: dict[str, Any]) -> str:
     settings = [[name, str(value)] for name, value in cell["settings"].items()]
     parts = [head]
     if rows:
-        parts.append(_table(["measure", "value", "unit"], rows, right=1))
+        parts.append(table(["measure", "value", "unit"], rows, right=1))
     if settings:
-        parts.append(_table(["set", "to"], settings))
+        parts.append(table(["set", "to"], settings))
     return "\n\n".join(parts)
 
 
@@ -84,7 +86,7 @@ def scenario_table() -> str:
         laws = [law for law in ("doc", "nc") if any(law in case.truths for case in cases)]
         kind = ", ".join(sorted(kinds))
         rows.append([family.name, str(len(cases)), " ".join(laws), kind, family.needs, family.question])
-    return _table(["scenario", "cases", "laws", "truth", "needs", "question"], rows)
+    return table(["scenario", "cases", "laws", "truth", "needs", "question"], rows)
 
 
 def engine_table() -> str:
@@ -92,4 +94,9 @@ def engine_table() -> str:
     for contestant in contestants.CONTESTANTS:
         why = contestant.availability()
         rows.append([contestant.name, contestant.version() or "-", why or "available"])
-    return _table(["contestant", "version", "here"], rows)
+    rows += [[own.name, own.version() or "-", contestants.HINT] for own in contestants.installed()]
+    return table(["contestant", "version", "here"], rows)
+
+
+def pair_law_table(laws: Iterable[Sequence[str]]) -> str:
+    return table(["engine", "restitution of two balls", "of a ball and a wall", "friction of block and plane"], laws)

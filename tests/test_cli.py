@@ -51,6 +51,9 @@ MISTAKES = [
     (["compare", "--out", "/proc/none"], "--out"),
     (["run", "equal_masses", "--engine", "mujoco", "--step", "1/60"], "one case"),
     (["run", "free_flight[dimension=1]", "--engine", "mujoco"], "--step"),
+    (["advise", "equal_masses"], "one case"),
+    (["advise", "equal_masses[bounciness=1]", "--error", "-1%"], "write it as 1% or 0.01"),
+    (["report", "nowhere"], "results.json"),
     (["compere"], "compare"),
     (["compare", "--stepp", "1/60"], "--step"),
 ]
@@ -100,6 +103,35 @@ def test_compare_measures_and_reports(tmp_path: Path) -> None:
     ]
     assert (errors.value.abs() < 1e-12).all()
     assert "static_wall" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_advise_names_the_cheapest_and_those_that_do_not_get_there() -> None:
+    words = ("--engine", "pymunk/tuned", "--engine", "mujoco/default", "--error", "1%", "--phases", "2")
+    done = impactbench("advise", "static_wall[bounciness=0.5]", *words, "--step", "1/240", "--step", "1/960")
+    assert done.returncode == 0, done.stderr
+    # Acting up to a step late costs (1 + e) v h: 1.5 * 3 m/s / 960 on the scale of a few metres; MuJoCo's default has no e.
+    assert "pymunk/tuned at 1/" in done.stdout
+    assert "not reached" in next(line for line in done.stdout.splitlines() if line.startswith("mujoco/default"))
+
+
+def test_report_renders_again_from_results(tmp_path: Path) -> None:
+    words = (
+        "free_flight[dimension=1]",
+        "--engine",
+        "pymunk",
+        "--step",
+        "1/60",
+        "--timing",
+        "none",
+        "--out",
+        str(tmp_path),
+    )
+    assert impactbench("compare", *words).returncode == 0
+    page = tmp_path / "report.html"
+    first = page.read_text(encoding="utf-8")
+    page.unlink()
+    assert impactbench("report", str(tmp_path)).returncode == 0
+    assert page.read_text(encoding="utf-8") == first
 
 
 def test_run_prints_a_cell_as_json() -> None:
