@@ -102,6 +102,9 @@ def test_half_step_offset_as_stated():
     assert half_step(BOUNCING, 1e-2, "energy_square") == pytest.approx(18511.6, abs=0.05)
     assert half_step(BOUNCING, 4e-3, "energy_square") == pytest.approx(2961.9, abs=0.05)
     assert half_step(TUMBLING, 1e-3, "position") == pytest.approx(0.049, rel=1e-12)
+    # m g^2 h T / 2 = 4.802 J of (m v^2 + w . L) / 2 = 368.546 J.
+    assert half_step(TUMBLING, 1e-3, "energy") == pytest.approx(4.802 / 368.546, rel=1e-5)
+    assert half_step(TUMBLING, 1e-3, "angular_momentum") is None
 
 
 def test_reflecting_gravity_too_gains_energy_at_a_steady_rate():
