@@ -29,6 +29,7 @@ from test_rigid_impact import (
     fractions,
     impacts,
     normals,
+    patient,
     ratios,
     rotations,
     speed,
@@ -52,11 +53,13 @@ def ball(mass: float, radius: float, velocity, spin, arm) -> Rigid:
 # The world's inertia
 
 
+@patient
 @given(rotations())
 def test_a_quaternion_turns_by_its_angle_about_its_axis(orientation):
     assert close(rotation(orientation), world_frame(orientation), 4)
 
 
+@patient
 @given(rotations(), vectors)
 def test_principal_moments_belong_to_the_turned_axes(orientation, spin):
     inertia, axes = world_inertia((1.0, 2.0, 3.0), orientation), rotation(orientation)
@@ -68,6 +71,7 @@ def test_principal_moments_belong_to_the_turned_axes(orientation, spin):
 # One-way and its limit
 
 
+@patient
 @given(impacts(one_way=True))
 def test_one_way_inelastic_stops_dead_and_elastic_acts_along_n(case):
     a, b, n, bounciness = case
@@ -83,6 +87,7 @@ def test_one_way_inelastic_stops_dead_and_elastic_acts_along_n(case):
     assert close(between.spin, bounciness * struck.spin, speed(struck))
 
 
+@patient
 @given(bodies(), impacts(one_way=True), st.sampled_from([1e4, 1e8, 1e12]))
 def test_one_way_is_the_limit_of_a_heavy_partner(heavy, case, ratio):
     a, b, n, _ = case
@@ -122,6 +127,7 @@ def test_two_static_bodies_are_refused():
 # Balls: where R14 is R7-R9, and where not
 
 
+@patient
 @given(ratios, ratios, vectors, vectors, normals(), st.floats(0.1, 1), st.floats(0.1, 1), fractions)
 def test_balls_without_spin(m_a, m_b, v_a, v_b, n, r_a, r_b, bounciness):
     n = n if (v_b - v_a) @ n < 0 else -n

@@ -27,6 +27,7 @@ from test_rigid_impact import (
     impacts,
     momentum_scale,
     normals,
+    patient,
     ratios,
     rotations,
     same,
@@ -48,6 +49,7 @@ def split(vector, normal) -> tuple[float, np.ndarray]:
     return along, vector - along * normal
 
 
+@patient
 @given(impacts(), frictions, arms)
 def test_momentum_and_angular_momentum_about_any_point_are_preserved(case, mu, point):
     a, b, n, e = case
@@ -57,6 +59,7 @@ def test_momentum_and_angular_momentum_about_any_point_are_preserved(case, mu, p
     assert close(angular_momentum(later, point), angular_momentum((a, b), point), scale)
 
 
+@patient
 @given(either, frictions)
 def test_newton_and_coulomb_hold_at_the_contact_point(case, mu):
     a, b, n, e = case
@@ -77,6 +80,7 @@ def test_newton_and_coulomb_hold_at_the_contact_point(case, mu):
         assert abs(float(impulse_t @ slip) + lost) <= (1 + mu) * rounding * (np.linalg.norm(slip) + scale)
 
 
+@patient
 @given(either, frictions)
 def test_energy_changes_by_the_work_of_the_impulse_and_never_grows_where_it_cannot(case, mu):
     a, b, n, e = case
@@ -90,6 +94,7 @@ def test_energy_changes_by_the_work_of_the_impulse_and_never_grows_where_it_cann
     assert energy(*smooth) <= energy(a, b) + ROUND * scale
 
 
+@patient
 @given(either)
 def test_without_friction_and_losses_it_is_the_elastic_case_of_the_documents(case):
     a, b, n, _ = case
@@ -97,6 +102,7 @@ def test_without_friction_and_losses_it_is_the_elastic_case_of_the_documents(cas
     assert same(struck(a, b, n, 1.0, 0.0), after(a, b, rigid_impact.elastic(a, b, n)), scale)
 
 
+@patient
 @given(impacts(), st.sampled_from([0.0, 0.3, 30.0]), rotations(), st.booleans(), vectors, vectors)
 def test_only_the_frame_changes(case, mu, orientation, mirror, velocity, spin):
     a, b, n, e = case
@@ -114,6 +120,7 @@ def test_only_the_frame_changes(case, mu, orientation, mirror, velocity, spin):
     assert same(struck(b, a, -n, e, mu)[::-1], right, scale)
 
 
+@patient
 @given(impacts(one_way=True), frictions)
 def test_one_way_is_the_limit_of_a_heavy_partner(case, mu):
     a, b, n, e = case
@@ -126,6 +133,7 @@ def test_one_way_is_the_limit_of_a_heavy_partner(case, mu):
 # Balls
 
 
+@patient
 @given(ratios, vectors, vectors, normals(), fractions, st.floats(0.01, 1), st.floats(0.1, 1))
 def test_a_ball_on_a_plane_slides_or_rolls(mass, velocity, spin, n, e, mu, radius):
     n = n if velocity @ n < 0 else -n
@@ -152,6 +160,7 @@ def test_a_ball_without_spin_leaves_rolling_with_five_sevenths_of_its_speed():
     assert spin == near([0.0, 7.5, 0.0])
 
 
+@patient
 @given(ratios, ratios, vectors, vectors, normals(), fractions)
 def test_balls_without_friction_are_particles(m_a, m_b, v_a, v_b, n, e):
     n = n if (v_b - v_a) @ n < 0 else -n
