@@ -79,7 +79,8 @@ def installed() -> tuple[Contestant, ...]:
     """Engines of installed packages, each `NAME/default`; from metadata alone. A name of ours stays ours."""
     points = importlib.metadata.entry_points(group=GROUP)
     return tuple(
-        Contestant(point.name, "default", f"{point.module}:{point.attr}", point.dist.name if point.dist else "")
+        # The value may end in extras: "module:Class [extra]".
+        Contestant(point.name, "default", point.value.partition("[")[0].strip(), point.dist.name if point.dist else "")
         for point in sorted(points, key=lambda point: point.name)
         if point.name not in _distinct("engine")
     )

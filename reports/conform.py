@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from impactbench.adapters.contestants import Contestant
 from impactbench.adapters.isolation import Job, run_jobs
 from impactbench.reports import contract
+from impactbench.reports.trial import Broken, NotBuilt
 from impactbench.scenarios.engine import Unavailable
 
-LIMIT = 120.0
+LIMIT = 60.0
 """Seconds a point may take, start of the child included."""
 PASS, FAIL, UNTRIED, UNAVAILABLE = "pass", "FAIL", "not tried", "unavailable"
 
@@ -57,9 +58,9 @@ def try_point(argument: tuple[str, Contestant]) -> Verdict:
     point, contestant = argument
     try:
         return Verdict(point, PASS, POINTS[point].check(contestant))
-    except contract.Broken as broken:
+    except Broken as broken:
         return Verdict(point, FAIL, str(broken))
-    except contract.NotBuilt:
+    except NotBuilt:
         return Verdict(point, UNTRIED, "the engine builds no such scene")
     except Unavailable as why:
         return Verdict(point, UNAVAILABLE, str(why))

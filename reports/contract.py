@@ -8,24 +8,33 @@ from __future__ import annotations
 import inspect
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from impactbench.adapters.contestants import Contestant
 from impactbench.reports.cell import step_count
-from impactbench.reports.compare import law_of
+from impactbench.reports.trial import (
+    PARTS,
+    STEP,
+    Broken,
+    NotBuilt,
+    Trial,
+    arrays_of,
+    distance,
+    kind_of,
+    must_be_same,
+    opening,
+    part_distance,
+    reordered,
+)
 from impactbench.scenarios import catalogue
-from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
+from impactbench.scenarios.engine import Unavailable, Unsupported
 from impactbench.scenarios.records import FULL
-from impactbench.scenarios.trajectory import Floats, State
 from impactbench.scenarios.truth import Case
 
-STEP = 1 / 60
-STEPS = 60
 FLIGHT_STEPS = (1 / 30, 1 / 60, 1 / 120, 1 / 240)
 ROUND_OFF = 1e-12
 """For a state that was only stored and turned: some thousand ulps."""
@@ -33,55 +42,6 @@ GROWN = 1e-9
 """For round-off that impacts and 60 steps have carried along, and for free flight that is exact."""
 ORDER = 0.9
 """Least order of free flight: first order is exactly 1 on a parabola, the rest is room for a start-up step."""
-PARTS = ("positions", "velocities", "orientations", "spins")
-
-
-class Broken(Exception):
-    """The point does not hold; the message is what was found."""
-
-
-class NotBuilt(Exception):
-    """The engine does not build this scene; whether it may refuse is a point of its own."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One case for one contestant, to be built as often as a point needs."""
-
-    contestant: Contestant
-    case: Case
-    step: float = STEP
-
-    @contextmanager
-    def world(self) -> Iterator[Engine]:
-        scene, law = self.case.scene, law_of(self.contestant, self.case, None)
-        kind = _kind(self.contestant)
-        try:
-            engine: Engine = kind(scene, law, self.contestant.profile, scene.model, self.step)
-        except Unavailable:
-            raise
-        except Exception as why:
-            raise NotBuilt from why
-        try:
-            yield engine
-        finally:
-            engine.close()
-
-    def steps(self) -> int:
-        return min(STEPS, step_count(self.case.scene, self.step))
-
-    def end(self) -> State:
-        """The state after all steps, taken one by one."""
-        with self.world() as engine:
-            for _ in range(self.steps()):
-                engine.advance(1)
-            return engine.read()
-
-
-@cache
-def _kind(contestant: Contestant) -> type[Engine]:
-    """Loaded once: a user's own file would be executed again, and worlds would no longer share its globals."""
-    return contestant.load()
 
 
 @cache
@@ -113,7 +73,7 @@ def everywhere(test: Callable[[Trial], float | None]) -> Callable[[Contestant], 
 
 
 def constructor(contestant: Contestant) -> str:
-    kind = _kind(contestant)
+    kind = kind_of(contestant)
     try:
         inspect.signature(kind).bind(*range(5))
     except TypeError as fault:
@@ -124,7 +84,7 @@ def constructor(contestant: Contestant) -> str:
 
 
 def methods(contestant: Contestant) -> str:
-    kind = _kind(contestant)
+    kind = kind_of(contestant)
     missing = [name for name in ("advance", "read", "close") if not callable(getattr(kind, name, None))]
     if missing:
         raise Broken(f"no {', no '.join(missing)}")
@@ -133,7 +93,7 @@ def methods(contestant: Contestant) -> str:
 
 def unsupported(contestant: Contestant) -> str:
     """Every scene, law and model: built, or refused with a reason."""
-    kind, built, refused = _kind(contestant), 0, 0
+    kind, built, refused = kind_of(contestant), 0, 0
     for case in _first_cases():
         scene = case.scene
         for law, model in ((law, model) for law in scene.laws for model in (scene.model, FULL)):
@@ -173,7 +133,7 @@ def arrays(trial: Trial) -> None:
     rows = len(state.positions)
     for name, width in (("positions", 3), ("velocities", 3), ("orientations", 4), ("spins", 3)):
         array = getattr(state, name)
-        if array is None and width + rows and name in ("orientations", "spins"):
+        if array is None and name in ("orientations", "spins"):
             continue
         if not isinstance(array, np.ndarray) or array.dtype != np.float64:
             raise Broken(f"{name} of type {getattr(array, 'dtype', type(array).__name__)}")
@@ -193,73 +153,29 @@ def initial_state(trial: Trial) -> float:
     scene = trial.case.scene
     with trial.world() as engine:
         state = engine.read()
-    expected = _opening(trial, state.spins is not None and state.orientations is not None)
-    away = _distance(state, expected, trial)
+    expected = opening(trial, state.spins is not None and state.orientations is not None)
+    away = distance(state, expected, trial)
     if away <= ROUND_OFF:
         return away
     rows = list(range(len(scene.movable)))
     turned = [rows[k:] + rows[:k] for k in rows] + [rows[k::-1] + rows[:k:-1] for k in rows]
-    if any(_distance(state, _reordered(expected, order), trial) <= ROUND_OFF for order in turned):
+    if any(distance(state, reordered(expected, order), trial) <= ROUND_OFF for order in turned):
         raise Broken("the rows in another order")
-    wrong = [part for part in PARTS if _part_distance(part, state, expected, trial) > ROUND_OFF]
+    wrong = [part for part in PARTS if part_distance(part, state, expected, trial) > ROUND_OFF]
     raise Broken(f"{' and '.join(wrong)} off by {away:.2g}")
-
-
-def _opening(trial: Trial, turning: bool) -> State:
-    bodies = [trial.case.scene.bodies[i] for i in trial.case.scene.movable]
-    places, speeds = (np.array(list(rows)) for rows in zip(*((b.position, b.velocity) for b in bodies), strict=True))
-    if not turning:
-        return State(places, speeds)
-    return State(places, speeds, np.array([b.orientation for b in bodies]), np.array([b.spin for b in bodies]))
-
-
-def _reordered(state: State, order: list[int]) -> State:
-    turns, spins = state.orientations, state.spins
-    return State(
-        state.positions[order],
-        state.velocities[order],
-        None if turns is None else turns[order],
-        None if spins is None else spins[order],
-    )
-
-
-def _distance(a: State, b: State, trial: Trial) -> float:
-    """Largest difference of any part, next to the scene's own scales; infinite where they cannot be compared."""
-    return max(_part_distance(part, a, b, trial) for part in PARTS)
-
-
-def _part_distance(part: str, a: State, b: State, trial: Trial) -> float:
-    mine, theirs = getattr(a, part), getattr(b, part)
-    if mine is None or theirs is None:
-        return 0.0
-    if mine.shape != theirs.shape:
-        return math.inf
-    gaps = np.abs(mine - theirs)
-    if part == "orientations":  # q and -q are one turn
-        gaps = np.minimum(gaps.max(axis=1), np.abs(mine + theirs).max(axis=1))
-    same = np.array_equal(mine, theirs, equal_nan=True)  # a run that diverges must diverge twice
-    scene = trial.case.scene
-    scale = {
-        "positions": max(scene.length, float(np.abs(theirs).max(initial=0.0))),
-        "velocities": scene.speed,
-        "orientations": 1.0,
-        "spins": scene.speed / scene.length + float(np.abs(theirs).max(initial=0.0)),
-    }[part]
-    largest = float(gaps.max(initial=0.0))
-    return 0.0 if same else largest / scale if math.isfinite(largest) else math.inf
 
 
 def mutation(trial: Trial) -> None:
     with trial.world() as engine:
         state = engine.read()
-        for array in _arrays_of(state):
+        for array in arrays_of(state):
             if array.flags.writeable:
                 array += 1.0
         engine.advance(1)
         after = engine.read()
     with trial.world() as engine:
         engine.advance(1)
-        away = _distance(after, engine.read(), trial)
+        away = distance(after, engine.read(), trial)
     if away > GROWN:
         raise Broken(f"a state {away:.2g} off after its arrays were written to")
 
@@ -267,29 +183,25 @@ def mutation(trial: Trial) -> None:
 def earlier_reads(trial: Trial) -> None:
     with trial.world() as engine:
         state = engine.read()
-        kept = [array.copy() for array in _arrays_of(state)]
+        kept = [array.copy() for array in arrays_of(state)]
         engine.advance(5)
         engine.read()
-    if not all(np.array_equal(old, now, equal_nan=True) for old, now in zip(kept, _arrays_of(state), strict=True)):
+    if not all(np.array_equal(old, now, equal_nan=True) for old, now in zip(kept, arrays_of(state), strict=True)):
         raise Broken("an earlier read that changed")
-
-
-def _arrays_of(state: State) -> list[Floats]:
-    return [array for name in PARTS if (array := getattr(state, name)) is not None]
 
 
 def advance(trial: Trial) -> float:
     with trial.world() as engine:
         engine.advance(trial.steps())
         at_once = engine.read()
-    away = _distance(at_once, trial.end(), trial)
+    away = distance(at_once, trial.end(), trial)
     if away > GROWN:
         raise Broken(f"states {away:.2g} apart after {trial.steps()} steps")
     return away
 
 
 def fresh_builds(trial: Trial) -> None:
-    _same(trial.end(), trial.end(), trial)
+    must_be_same(trial.end(), trial.end(), trial)
 
 
 def company(trial: Trial) -> None:
@@ -304,7 +216,7 @@ def company(trial: Trial) -> None:
                 company.advance(1)
             company.read()
         engine.advance(1)
-        _same(engine.read(), alone, trial)
+        must_be_same(engine.read(), alone, trial)
 
 
 def _refuses(trial: Trial) -> bool:
@@ -313,12 +225,6 @@ def _refuses(trial: Trial) -> bool:
             return False
     except NotBuilt:
         return True
-
-
-def _same(a: State, b: State, trial: Trial) -> None:
-    away = _distance(a, b, trial)
-    if away:
-        raise Broken(f"states {away:.2g} apart after {trial.steps()} steps")
 
 
 def spins(trial: Trial) -> None:
@@ -351,7 +257,7 @@ def _flight_error(trial: Trial) -> float:
     with trial.world() as engine:
         for _ in range(count):
             engine.advance(1)
-        return _distance(engine.read(), truth, trial)
+        return distance(engine.read(), truth, trial)
 
 
 def _convergence(errors: Sequence[float]) -> str:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 WIDTH, HEIGHT = 64, 21
 TALL = 2.0
 """Height of a character over its width."""
-MARGIN = 0.25
-"""Of the movable bodies' extent, left free on every side."""
+MARGIN = 0.35
+"""Of the movable bodies' extent, left free on every side: an arrow is up to 4 lines long."""
 SHAFTS, TIPS = "-/|\\", ">^^^<vvv"
 """Of arrows, by direction in eighths of a turn from the first axis."""
 NAMED_BODIES = 30
@@ -213,7 +213,7 @@ def _draw_arrow(canvas: Canvas, scene: Scene, body: Body, points: Floats, axes: 
         if not _covered(body, place[None, None], axes)[0, 0]:
             break
         place = place + cell * heading
-    length = cell * (3 + 7 * speed / fastest)
+    length = cell * (2 + 5 * speed / fastest)
     eighth = round(math.atan2(heading[1], heading[0]) / (math.pi / 4)) % 8
     _put(canvas, place + length * heading, points, cell, TIPS[eighth])
     for part in np.arange(0.0, length, cell / 2):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from itertools import count
 
 import numpy as np
@@ -160,10 +161,10 @@ class NeverSpins(Faithful):
 
 
 class Dying(Faithful):
-    def read(self) -> State:
-        import os
-
-        os.abort()
+    def advance(self, steps: int) -> None:
+        if steps > 5:
+            os.abort()
+        super().advance(steps)
 
 
 class Refusing(Faithful):
