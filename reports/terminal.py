@@ -25,7 +25,7 @@ def table(columns: Iterable[str], rows: Iterable[Sequence[str]], right: int = 99
     """Columns from number `right` on hold figures and are set flush right."""
     table = Table(box=None, pad_edge=False)
     for number, column in enumerate(columns):
-        table.add_column(column, justify="right" if number >= right else "left", overflow="fold")
+        table.add_column(column, justify="right" if number >= right else "left", overflow="fold", no_wrap=number == 0)
     for row in rows:
         table.add_row(*(_escape(cell) for cell in row))
     return _text(table)
