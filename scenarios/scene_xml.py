@@ -54,6 +54,7 @@ URDF: Mapping[str, str] = {
     "parent": "link",
     "child": "link",
 }
+GEOMS = ("plane", "sphere", "capsule", "box")
 JOINTS = {"mujoco": ("free",), "robot": ("floating", "fixed")}
 
 
@@ -81,9 +82,10 @@ class _Reader:
         what = f"<{_short(tag)}>{_named(attributes)}"
         if tag not in known:
             self.fail(f"{what} cannot be carried over")
-        kind = attributes.get("type", JOINTS[self.root][0])
-        if tag == "joint" and kind not in JOINTS[self.root]:
-            self.fail(f"{what} of type {_short(kind)} cannot be carried over; only {' and '.join(JOINTS[self.root])}")
+        kinds = {"joint": JOINTS[self.root], "geom": GEOMS}.get(tag, ())
+        kind = attributes.get("type", "")
+        if kind and kinds and kind not in kinds:
+            self.fail(f"{what} of type {_short(kind)} cannot be carried over; only {', '.join(kinds)}")
         for name in attributes:
             if name not in known[tag].split():
                 self.fail(f"{_short(name)} of {what} cannot be carried over")
