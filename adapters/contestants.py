@@ -62,6 +62,7 @@ class Contestant:
 
 CONTESTANTS = (
     Contestant("reference", "stepped", "impactbench.reference.contestant:Stepped", "impactbench", "doc"),
+    Contestant("reference", "exact", "impactbench.reference.exact_contestant:Exact", "impactbench", "doc"),
     *(
         Contestant(engine, profile, f"impactbench.adapters.{engine}_adapter:{name}", engine)
         for engine, name in (("pybullet", "Bullet"), ("mujoco", "MuJoCo"), ("pymunk", "Pymunk"))

@@ -59,15 +59,14 @@ def build_cells(position: Floats, radius: Floats, axes: tuple[int, ...]) -> Cell
 
 
 @compiled
-def cell_of(cells: Cells, x: int, y: int, z: int) -> int:
-    """Number of a cube's cell, counted modulo `number` along each axis."""
-    n = cells.number
+def cell_of(n: Indices, x: int, y: int, z: int) -> int:
+    """Number of a cube's cell, counted modulo the numbers of cells n along each axis."""
     return int((x % n[0] * n[1] + y % n[1]) * n[2] + z % n[2])
 
 
 @compiled
 def enter(cells: Cells, body: int) -> None:
-    cell = cell_of(cells, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])
+    cell = cell_of(cells.number, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])
     first = cells.head[cell]
     cells.after[body], cells.before[body] = first, EMPTY
     if first != EMPTY:
@@ -83,7 +82,7 @@ def leave(cells: Cells, body: int) -> None:
     if before != EMPTY:
         cells.after[before] = after
     else:
-        cells.head[cell_of(cells, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])] = after
+        cells.head[cell_of(cells.number, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])] = after
 
 
 @compiled

@@ -55,6 +55,15 @@ def land(gap: float, speed: float, pull: float) -> float:
 
 
 @compiled
+def fall_back(gap: float, speed: float, pull: float) -> float:
+    """Later root of gap + speed t + pull t^2/2 = 0 from behind a face (gap < 0): up through its plane and down."""
+    square = speed * speed - 2.0 * pull * gap
+    if speed <= 0.0 or pull >= 0.0 or square <= 0.0:
+        return math.inf
+    return -(speed + math.sqrt(square)) / pull
+
+
+@compiled
 def curve(
     x: float,
     y: float,

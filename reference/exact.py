@@ -92,7 +92,8 @@ def count_event(world: World, i: int, now: float) -> bool:
     """Bring sphere i to its event and count it. True if its events no longer get on in time."""
     s = world.spheres
     span = max(world.rules.instant, 4e-16 * now)
-    s.crowd[i] = s.crowd[i] + 1 if now - s.time[i] <= span else 0
+    s.crowd[i] = s.crowd[i] + 1 if now - s.struck[i] <= span else 0
     s.events[i] += 1
+    s.struck[i] = now
     fly(world, i, now)
     return bool(s.crowd[i] > CROWD and s.inverse_mass[i] > 0.0)

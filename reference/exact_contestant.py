@@ -62,7 +62,7 @@ class Exact:
         raise RuntimeError(f"{where}: more than {MOST_EVENTS} events")
 
     def read(self) -> State:
-        """Positions and velocities now; bodies keep the times of their last events, so reading changes nothing."""
+        """Positions and velocities now; each body has a time of its own, so reading changes nothing."""
         s, count = self._world.spheres, self._world.rules.movable
         span = (self._done * self._step - s.time[:count])[:, None]
         velocity, pull = s.velocity[:count], s.acceleration[:count]

@@ -49,8 +49,9 @@ def strike_wall(world: World, i: int, w: int) -> None:
     """One-way impact: v' = b (v - 2 (v . n) n) (documents, rule R13) or v' = v - (1 + e) (v . n) n (Newton).
 
     Bounces get shorter without end where b < 1 (Zeno). A sphere that leaves slower than `rest` [m/s] and is pressed
-    back by gravity is at rest on the wall; the bounces left out rise less than rest^2/(2 a). Without a pressing gravity
-    it must not leave at all.
+    back by gravity is at rest on the wall; the bounces left out rise less than rest^2/(2 a). With b = 1, bounces of
+    round-off would go on for ever: such that rise less than `rise` [m] are left out. Without a pressing gravity the
+    sphere must not leave at all.
     """
     s, n, rules = world.spheres, world.walls.normal[w], world.rules
     b = rules.bounciness[s.group[i], world.walls.group[w]]
@@ -59,8 +60,13 @@ def strike_wall(world: World, i: int, w: int) -> None:
     for k in range(3):
         v[k] = b * (v[k] - 2.0 * along * n[k]) if rules.doc else v[k] - (1.0 + b) * along * n[k]
     pull = rules.gravity[0] * n[0] + rules.gravity[1] * n[1] + rules.gravity[2] * n[2]
-    slow = rules.rest if pull < 0.0 and b < 1.0 else rules.still
+    slow = rules.still
+    if pull < 0.0:
+        slow = rules.rest if b < 1.0 else math.sqrt(-2.0 * pull * rules.rise)
     s.rests[i, w] = pull <= 0.0 and -b * along <= slow
+    if s.rests[i, w]:
+        for k in range(3):
+            v[k] += b * along * n[k]
 
 
 @compiled

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from impactbench.reference.particles import Indices
+from impactbench.reference.particles import Flags, Indices
 from impactbench.scenarios.records import Box, HalfSpace, Model, Scene, Vector
 from impactbench.scenarios.trajectory import Floats
 
@@ -22,6 +22,8 @@ class Walls(NamedTuple):
     low: Floats
     high: Floats
     group: Indices
+    bounded: Flags
+    """Whether the wall is a box's face, which ends."""
 
 
 Wall = tuple[Vector, float, Vector, Vector, int]
@@ -46,6 +48,7 @@ def build_walls(scene: Scene, model: Model, groups: list[int]) -> Walls:
         low=np.array([wall[2] for wall in walls], dtype=np.float64).reshape(-1, 3),
         high=np.array([wall[3] for wall in walls], dtype=np.float64).reshape(-1, 3),
         group=np.array([wall[4] for wall in walls], dtype=np.int64),
+        bounded=np.array([wall[3] != FREE for wall in walls], dtype=np.bool_),
     )
 
 

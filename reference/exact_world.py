@@ -12,15 +12,16 @@ from impactbench.reference.particles import Flags, Indices
 from impactbench.scenarios.records import Law, Model, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats
 
-REST, STILL, TOUCH, INSTANT = 1e-10, 1e-13, 1e-10, 1e-13
+REST, STILL, TOUCH, INSTANT, RISE = 1e-10, 1e-13, 1e-10, 1e-13, 1e-14
 """Next to the scene's scales: speed off a wall below which a pressed body rests, speed that counts as none, gap that
-counts as touching at t = 0, and span of time that counts as one instant."""
+counts as touching at t = 0, span of time that counts as one instant, and
+height of an elastic bounce that counts as rest."""
 
 
 class Spheres(NamedTuple):
     """Movable spheres first, in scene order, then static ones with inverse mass 0. SI units, shapes [n] and [n, 3].
 
-    Position and velocity are those at the body's own `time` [s], that of its last event; from there on it flies at
+    Position and velocity are those at the body's own `time` [s]; from there on it flies at
     constant acceleration. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which
     outdates predictions made before. kind, partner and partner_events: its next event.
     """
@@ -37,6 +38,8 @@ class Spheres(NamedTuple):
     kind: Indices
     partner: Indices
     partner_events: Indices
+    struck: Floats
+    """Time [s] of its last impact."""
     crowd: Indices
     """How many events in a row fell on one instant."""
 
@@ -53,6 +56,7 @@ class Rules(NamedTuple):
     still: float
     touch: float
     instant: float
+    rise: float
 
 
 class World(NamedTuple):
@@ -86,6 +90,7 @@ def build_world(scene: Scene, law: Law, model: Model) -> World:
             still=STILL * scene.speed,
             touch=TOUCH * scene.length,
             instant=INSTANT * scene.length / scene.speed,
+            rise=RISE * scene.length,
         ),
         queue=build_queue(len(scene.movable)),
         cells=build_cells(spheres.position, spheres.radius, model.axes),
@@ -109,6 +114,7 @@ def build_spheres(scene: Scene, order: list[int], gravity: Floats, groups: list[
         kind=np.zeros(count, dtype=np.int64),
         partner=np.zeros(count, dtype=np.int64),
         partner_events=np.zeros(count, dtype=np.int64),
+        struck=np.zeros(count),
         crowd=np.zeros(count, dtype=np.int64),
     )
 

@@ -19,7 +19,7 @@ def test_filters():
     assert names("mujoco") == ["mujoco/default", "mujoco/tuned"]
     assert names("pymunk/tuned", "mujoco/tuned", "mujoco/t*") == ["mujoco/tuned", "pymunk/tuned"]
     assert names("py*", profiles=("default",)) == ["pybullet/default", "pymunk/default"]
-    assert names("*/stepped") == ["reference/stepped"]
+    assert names("reference") == ["reference/stepped", "reference/exact"]
     assert {c.law for c in select(["reference"])} == {"doc"}
     assert {c.law for c in select(profiles=["default", "tuned"])} == {"nc"}
 
@@ -33,7 +33,7 @@ def test_filters():
             "unknown contestant 'mujco'; did you mean mujoco\\? known: reference, pybullet, .*pymunk/tuned",
         ),
         (["zzz"], [], "unknown contestant 'zzz'; known: reference"),
-        ([], ["tunned"], "unknown profile 'tunned'; did you mean tuned\\? known: stepped, default, tuned"),
+        ([], ["tunned"], "unknown profile 'tunned'; did you mean tuned\\? known: stepped, exact, default, tuned"),
         (["reference"], ["tuned"], "no contestant is both reference and tuned"),
         (["absent.py:Fake"], [], "'absent.py:Fake': no such file"),
         (["a:Fake", "b:Fake"], [], "a:Fake and b:Fake are both named Fake/default"),
