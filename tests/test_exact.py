@@ -122,7 +122,7 @@ def test_a_hundred_elastic_spheres_keep_their_energy(count):
     while run.impacts[0] < count:
         run.advance(100)
         least = min(least, least_gap(world, run.read().positions))
-    # Each impact errs by some EPS of its own share, 1/50 of the whole; a million in one direction would give 1e-11.
+    # Each impact errs by some EPS of the whole at most, at random: EPS sqrt(10^6) = 2e-13.
     assert abs((run.read().velocities ** 2).sum() / start - 1) <= 1e-12
     assert least >= -50 * EPS * 6  # coordinates up to 6 m
 
