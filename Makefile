@@ -6,7 +6,7 @@ STAMP := $(VENV)/installed
 # mypy and import-linter do not follow the editable finder; they do follow a folder of links.
 LINKS := $(VENV)/links
 
-.PHONY: compare test check format lint types layers tests lock clean
+.PHONY: compare test check format lint types layers tests picture lock clean
 
 compare: $(STAMP)
 	$(BIN)/impactbench compare --out out $(ARGS)
@@ -38,6 +38,11 @@ $(STAMP): requirements.lock pyproject.toml
 	mkdir -p $(LINKS)/impactbench
 	for part in scenarios reference adapters reports; do ln -sfn ../../../$$part $(LINKS)/impactbench/$$part; done
 	touch $@
+
+# The README's picture, from a real run: needs Debian's chromium.
+picture: out/report.html
+	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1366,760 --virtual-time-budget=4000 \
+	  --screenshot=docs/report.png file://$(CURDIR)/out/report.html
 
 # New versions: needs uv (pip install uv).
 lock:

@@ -29,6 +29,7 @@ class Contestant:
     factory: str  # "package.module:Class" or "path/to/file.py:Class"
     distribution: str = ""  # the installed package that carries it; none for a user's own engine
     law: Law = "nc"
+    stepless: bool = False  # goes from event to event: a step is only how often it is read
 
     @property
     def name(self) -> str:
@@ -62,7 +63,9 @@ class Contestant:
 
 CONTESTANTS = (
     Contestant("reference", "stepped", "impactbench.reference.contestant:Stepped", "impactbench", "doc"),
-    Contestant("reference", "exact", "impactbench.reference.exact_contestant:Exact", "impactbench", "doc"),
+    Contestant(
+        "reference", "exact", "impactbench.reference.exact_contestant:Exact", "impactbench", "doc", stepless=True
+    ),
     *(
         Contestant(engine, profile, f"impactbench.adapters.{engine}_adapter:{name}", engine)
         for engine, name in (("pybullet", "Bullet"), ("mujoco", "MuJoCo"), ("pymunk", "Pymunk"))

@@ -61,14 +61,14 @@ def _steps(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple
 
 
 def _contestants(engines: Sequence[str], profile: str) -> Sequence[Contestant]:
-    """An engine named with its profile needs no `--profile`; the reference has one profile, which always passes."""
+    """An engine named with its profile needs no `--profile`; the reference's own always pass."""
     from impactbench.adapters import contestants
 
     whole = [name for name in engines if "/" in name]
     try:
         if whole and len(whole) == len(engines):
             return contestants.select(engines)
-        return contestants.select(engines, () if profile == "both" else (profile, "stepped"))
+        return contestants.select(engines, () if profile == "both" else (profile, "stepped", "exact"))
     except ValueError as error:
         raise click.UsageError(str(error)) from None
 

@@ -73,7 +73,7 @@ class Plan:
             for case in self.cases
             for model in self.models
             for phase in (self.phases if case.scene.phase_free and case.scene.name in timed else self.phases[:1])
-            for step in self.steps
+            for step in (self.steps if not contestant.stepless else [min(self.steps, key=step_seconds)])
         ]
 
 
@@ -185,8 +185,8 @@ def _cell_record(cell: Cell, contestant: Contestant, outcome: dict[str, Any]) ->
         "law": cell.law,
         "contestant": cell.contestant,
         "model": cell.model,
-        "step": step_seconds(cell.step),
-        "step_text": cell.step,
+        "step": None if contestant.stepless else step_seconds(cell.step),
+        "step_text": "no step" if contestant.stepless else cell.step,
         "phase": cell.phase,
         "state": outcome["state"],
         "reason": outcome["reason"],

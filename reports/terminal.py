@@ -38,18 +38,18 @@ def _escape(text: str) -> str:
 
 
 def summary(document: dict[str, Any]) -> str:
-    """A line per contestant: cells by state, and the worst headline error and energy gain at its finest step."""
+    """A line per contestant: cells by state, and the worst headline error and conservation at the finest step."""
     headline = {case["name"]: case["headline"] for case in document["cases"]}
     cells = document["cells"]
     states: dict[str, Counter[str]] = {}
     for cell in cells:
         states.setdefault(cell["contestant"], Counter())[cell["state"]] += 1
-    finest = min((cell["step"] for cell in cells), default=0.0)
+    finest = min((cell["step"] for cell in cells if cell["step"]), default=None)
     worst: dict[tuple[str, str], tuple[float, str]] = {}
     for row in document["rows"]:
         cell = cells[row["cell"]]
         kind = "error" if row["measure"] == headline[cell["case"]] else row["measure"]
-        if cell["step"] == finest and kind in ("error", "energy_gain", "momentum_drift"):
+        if cell["step"] in (finest, None) and kind in ("error", "energy_gain", "momentum_drift"):
             key = (cell["contestant"], kind)
             worst[key] = max(worst.get(key, (-1.0, "")), (abs(row["value"]), cell["case"]))
     rows = []
