@@ -14,12 +14,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from impactbench.reports.measures import self_consistency
 from impactbench.scenarios import scene_file
 from impactbench.scenarios.catalogue import select
 from impactbench.scenarios.records import Box, Capsule, Contact, HalfSpace, Scene, Sphere
 from impactbench.scenarios.scene_file import LARGEST_FILE, MEASURES, read_case
 from impactbench.scenarios.scene_lines import key_lines
 from impactbench.scenarios.scene_values import LARGEST, SceneError
+from impactbench.scenarios.trajectory import Trajectory
 
 COMMAND = str(Path(sys.executable).parent / "impactbench")
 DOCUMENT = Path(__file__).parents[1] / "docs" / "scene-files.md"
@@ -172,6 +174,25 @@ def test_the_document_names_every_key() -> None:
     assert not [
         key for key in keys if f"`{key}`" not in text and f"`[{key}]`" not in text and f"`[[{key}]]`" not in text
     ]
+
+
+def test_a_scene_too_large_to_measure_says_so_before_it_runs(tmp_path: Path) -> None:
+    balls = "".join(BALL.replace('name = "ball"\n', "").replace("0, 0, 0.5", f"{i}, 0, 1") for i in range(1000))
+    (tmp_path / "many.toml").write_text(HEAD + balls)
+    done = impactbench("run", "many.toml", "--engine", "mujoco/tuned", "--step", "1/480", cwd=tmp_path)
+    assert done.returncode == 3
+    assert "unsupported (499500 pairs at 240 steps" in done.stdout
+
+
+def test_self_consistency_is_the_largest_distance_and_the_time_it_stays_small() -> None:
+    times, still = np.arange(5.0), np.zeros((5, 1, 3))
+    moved = still.copy()
+    moved[:, 0, 0] = [0, 0.01, 0.03, 0.5, 0.2]  # [m], in a scene of length 2 m
+    scene = replace(select(["static_wall"])[0].scene, length=2.0)
+    figures = self_consistency(scene, Trajectory(times, still, still), Trajectory(times, moved, still))
+    assert {f.measure: f.value for f in figures} == {"self_error": 0.25, "self_horizon": 0.5}
+    lost = self_consistency(scene, Trajectory(times, still, still), Trajectory(times, moved * np.nan, still))
+    assert [f.value for f in lost] == [np.inf]
 
 
 # --- broken files ---
