@@ -82,7 +82,7 @@ def test_compare_measures_and_reports(tmp_path: Path) -> None:
     words = (
         "static_wall[bounciness=0.5]",
         "--engine",
-        "reference",
+        "reference/stepped",
         "--step",
         "1/60",
         "--step",
