@@ -5,18 +5,15 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
 if TYPE_CHECKING:
-    from impactbench.adapters.contestants import Contestant
-    from impactbench.reports.compare import Progress
     from impactbench.scenarios.records import Law
-    from impactbench.scenarios.truth import Case
 
 NOTHING_MEASURED = 3
 STEP_HELP = "Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960."
@@ -25,23 +22,7 @@ TIMING_HELP = "Time a case of each of six families, every case, or none."
 ENGINE_HELP = "An engine (mujoco), a contestant (mujoco/tuned), a glob, or FILE.py:Class for your own. Repeatable."
 
 
-class _Plain(click.Group):
-    """Any mistake of the user's is one line on stderr and exit code 2."""
-
-    def main(self, *args: Any, **kwargs: Any) -> Any:
-        try:
-            return super().main(*args, **{**kwargs, "standalone_mode": False})
-        except click.exceptions.Exit as done:
-            sys.exit(done.exit_code)
-        except (click.exceptions.Abort, KeyboardInterrupt):
-            click.echo("impactbench: interrupted", err=True)
-            sys.exit(130)
-        except click.ClickException as error:
-            click.echo(f"impactbench: {' '.join(error.format_message().split())}", err=True)
-            sys.exit(2)
-
-
-@click.group(cls=_Plain, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="impactbench")
 def main() -> None:
     """Compare rigid-body engines on contact scenes with known truth: momentum, energy, penetration, speed against
@@ -49,78 +30,12 @@ def main() -> None:
     """
 
 
-def _steps(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
-    from impactbench.reports.cell import step_seconds
-
-    for text in texts:
-        try:
-            step_seconds(text)
-        except ValueError as error:
-            raise click.BadParameter(str(error)) from None
-    return tuple(dict.fromkeys(texts))
-
-
-def _contestants(engines: Sequence[str], profile: str) -> Sequence[Contestant]:
-    """An engine named with its profile needs no `--profile`; the reference's own always pass."""
-    from impactbench.adapters import contestants
-
-    whole = [name for name in engines if "/" in name]
-    try:
-        if whole and len(whole) == len(engines):
-            return contestants.select(engines)
-        return contestants.select(engines, () if profile == "both" else (profile, "stepped", "exact"))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-
-
-def _cases(names: Sequence[str]) -> list[Case]:
-    from impactbench.scenarios import catalogue
-
-    try:
-        return catalogue.select(names)
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
-
-
-def _folder(path: Path) -> Path:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        probe = path / f".probe-{os.getpid()}"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        message = f"cannot write to {path}: {error.strerror}; choose another folder with --out"
-        raise click.UsageError(message) from None
-    return path
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """A bar with the remaining time on stderr; nothing where stderr is not a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda *_: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, Any] = {}
-
-        def show(lane: str, done: int, total: int) -> None:
-            task = tasks.setdefault(lane, None) or bar.add_task(lane, total=total)
-            tasks[lane] = task
-            bar.update(task, completed=done)
-
-        yield show
-
-
 @main.command()
 @click.argument("cases", nargs=-1, metavar="[CASE ...]")
 @click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
 @click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
 @click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
-@click.option("--step", "steps", multiple=True, callback=_steps, help=STEP_HELP)
+@click.option("--step", "steps", multiple=True, callback=steps_of, help=STEP_HELP)
 @click.option("--model", type=click.Choice(["minimal", "full", "both"]), default="minimal", show_default=True)
 @click.option(
     "--timing", type=click.Choice(["some", "all", "none"]), default="some", show_default=True, help=TIMING_HELP
@@ -145,7 +60,7 @@ def compare(
     CASE is a family (equal_masses), a case (equal_masses[bounciness=0.5]) or a glob; none means all. Exit code 3:
     nothing was measured.
     """
-    chosen, contestants, folder = _cases(cases), _contestants(engines, profile), _folder(out)
+    chosen, contestants, folder = cases_of(cases), contestants_of(engines, profile), writable_folder(out)
 
     from impactbench.reports.compare import LADDER, Plan
     from impactbench.reports.compare import compare as run_comparison
@@ -154,7 +69,7 @@ def compare(
     plan = Plan(
         chosen, contestants, steps or LADDER, law, models, tuple(k / phases for k in range(phases)), jobs, timing
     )
-    with _progress() as progress:
+    with progress_bar() as progress:
         document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
     _write(document, folder)
     from impactbench.reports.terminal import summary
@@ -179,7 +94,7 @@ def _write(document: dict[str, Any], folder: Path) -> None:
 @main.command()
 @click.argument("case")
 @click.option("--engine", required=True, help="One contestant: mujoco (with --profile), mujoco/tuned or FILE.py:Class.")
-@click.option("--step", "steps", required=True, multiple=True, callback=_steps, help="Step [s], 1/240 or 0.004.")
+@click.option("--step", "steps", required=True, multiple=True, callback=steps_of, help="Step [s], 1/240 or 0.004.")
 @click.option("--profile", type=click.Choice(["default", "tuned"]), default="tuned", show_default=True)
 @click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
 @click.option("--model", type=click.Choice(["minimal", "full"]), default="minimal", show_default=True)
@@ -198,7 +113,7 @@ def run(
     as_json: bool,
 ) -> None:
     """Run one cell and print all its measures. Exit code 3: it could not be measured."""
-    chosen, contestants = _cases([case]), _contestants([engine], profile)
+    chosen, contestants = cases_of([case]), contestants_of([engine], profile)
     if len(chosen) != 1 or len(contestants) != 1 or len(steps) != 1:
         names = [c.scene.name for c in chosen] if len(chosen) != 1 else [c.name for c in contestants]
         got = f"{len(chosen)} cases, {len(contestants)} contestants, {len(steps)} steps ({', '.join(names[:4])}, ...)"
@@ -227,13 +142,13 @@ def run(
 @click.option("--error", "text", default="1%", show_default=True, help="Largest error allowed: 1% or 0.01.")
 @click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
 @click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
-@click.option("--step", "steps", multiple=True, callback=_steps, help=STEP_HELP)
+@click.option("--step", "steps", multiple=True, callback=steps_of, help=STEP_HELP)
 @click.option(
     "--phases", type=click.IntRange(1, 64), default=8, show_default=True, help="Impact phases tried per step."
 )
 def advise(case: str, text: str, engines: tuple[str, ...], profile: str, steps: tuple[str, ...], phases: int) -> None:
     """Say which step each contestant may take on CASE to stay below an error, and what it costs."""
-    chosen, contestants = _cases([case]), _contestants(engines, profile)
+    chosen, contestants = cases_of([case]), contestants_of(engines, profile)
     if len(chosen) != 1:
         raise click.UsageError(f"advise takes one case; {case} is {', '.join(c.scene.name for c in chosen)}")
 
@@ -247,7 +162,7 @@ def advise(case: str, text: str, engines: tuple[str, ...], profile: str, steps: 
         raise click.UsageError(str(error)) from None
     shifts = tuple(k / phases for k in range(phases))
     plan = Plan(chosen, contestants, steps or LADDER, phases=shifts, jobs=os.cpu_count() or 1, timing="all")
-    with _progress() as progress:
+    with progress_bar() as progress:
         document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
     click.echo(advice(document, target))
     if not any(cell["state"] == "ok" for cell in document["cells"]):
@@ -277,7 +192,7 @@ def conform(engine: str) -> None:
     ENGINE is an engine (mujoco), a contestant (mujoco/tuned), FILE.py:Class or an installed engine's name. Exit code 1:
     a point fails; 3: an engine could not be run.
     """
-    contestants = _contestants([engine], "both")
+    contestants = contestants_of([engine], "both")
 
     from impactbench.reports import conform as contract
 
@@ -290,7 +205,7 @@ def conform(engine: str) -> None:
 @click.argument("case")
 def show(case: str) -> None:
     """Show a case: bodies, coefficients, truth, scales and a sketch of the start."""
-    chosen = _cases([case])
+    chosen = cases_of([case])
     if len(chosen) != 1:
         names = [c.scene.name for c in chosen]
         raise click.UsageError(f"show takes one case; {case} is {len(names)}: {', '.join(names)}")
@@ -316,7 +231,7 @@ def reproduce(names: tuple[str, ...], jobs: int, as_json: bool) -> None:
         entries = reproduction.plan(names)
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-    with _progress() as progress:
+    with progress_bar() as progress:
         rows = reproduction.reproduce(entries, jobs, progress)
     if as_json:
         import json
