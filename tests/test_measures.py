@@ -217,3 +217,20 @@ def test_the_interval_of_the_median_is_the_binomial_one() -> None:
 def test_a_step_that_is_no_step_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="write it as 1/240"):
         step_seconds(text)
+
+
+def test_the_deepest_overlap_of_any_pair_is_the_penetration() -> None:
+    """One ball of three pushed 0.02 m into its neighbour for one sample: the other pairs stay apart."""
+    case = case_of("newtons_cradle[count=3,gap=0.01]")
+    run = true_run(case, "nc")
+    positions = run.positions.copy()
+    first, second = (case.scene.bodies[index] for index in case.scene.movable[:2])
+    assert isinstance(first.shape, Sphere)
+    assert isinstance(second.shape, Sphere)
+    # Sample 0, the first ball at rest or moving: put it where the centres are 0.02 m closer than the radii allow.
+    positions[0, 0] = positions[0, 1] - np.array([first.shape.radius + second.shape.radius - 0.02, 0, 0])
+    found = figures(case, "nc", replace(run, positions=positions))
+    depth = 0.02 / case.scene.length
+    assert found["penetration_max"] == pytest.approx(depth, rel=1e-12)
+    assert found["penetration_rms"] == pytest.approx(depth / math.sqrt(len(run.times)), rel=1e-12)
+    assert found["penetration_final"] < ROUND_OFF
