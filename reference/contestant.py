@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from impactbench.reference.particles import build_bodies, build_pairs, check_supported
 from impactbench.reference.stepped import SWEEPS, Rules, run, start
-from impactbench.scenarios.records import Body, HalfSpace, Law, Model, Scene, Sphere
+from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
 STRATEGIES = {"stepped": "project", "revert": "revert"}
@@ -75,13 +75,3 @@ def strategy_of(profile: str) -> str:
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ValueError(f"unknown profile {profile!r}: one of {', '.join(STRATEGIES)}{hint}")
     return STRATEGIES[profile]
-
-
-def warm_up(_: object = None) -> None:
-    """Run every kernel once, so that later processes find them compiled."""
-    ball = Body("ball", Sphere(0.5), 1.0, (0.0, 0.0, 1.0))
-    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), None, (0.0, 0.0, 0.0))
-    scene = Scene("warm_up", (ball, floor), 1.0, Model((2,), gravity=True), 1.0, 1.0, 1.0, gravity=(0.0, 0.0, -9.81))
-    for law in scene.laws:
-        engine = Stepped(scene, law, "stepped", scene.model, 1 / 60)
-        engine.advance(1)

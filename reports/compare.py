@@ -107,7 +107,8 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
         ],
     }
     outcomes = accuracy_lane(cells, plan.jobs, progress)
-    timings = timing_lane(_timed(plan, cells, outcomes), progress)
+    timings, untimed = timing_lane(_timed(plan, cells, outcomes), progress)
+    document["provenance"]["notes"] += untimed
     for cell, contestant in cells:
         outcome = outcomes[cell.key]
         document["cells"].append(_cell_record(cell, contestant, outcome))
@@ -139,9 +140,9 @@ def accuracy_lane(cells: Sequence[Entry], jobs: int, progress: Progress) -> dict
 
 
 def _compile_reference(progress: Progress) -> None:
-    """Compile the reference's kernels before any cell's clock runs: some 20 s the first time, then stored on disk."""
+    """Compile the reference's kernels before any cell's clock runs: under a minute the first time, then stored."""
     progress("compiling the reference (first run only)", 0, 1)
-    for _ in run_jobs([Job("warm-up", "reference", "impactbench.reference.contestant:warm_up", None, 600.0)], 1):
+    for _ in run_jobs([Job("warm-up", "reference", "impactbench.reference.warm_up:warm_up", None, 600.0)], 1):
         progress("compiling the reference (first run only)", 1, 1)
 
 
@@ -162,20 +163,23 @@ def _timed(plan: Plan, cells: Sequence[Entry], outcomes: dict[str, dict[str, Any
     return list(groups.values())
 
 
-def timing_lane(groups: Sequence[list[Entry]], progress: Progress) -> dict[str, list[float]]:
-    """One process, one thread, one case after another; a group that fails has no times, and its accuracy stands."""
+def timing_lane(groups: Sequence[list[Entry]], progress: Progress) -> tuple[dict[str, list[float]], list[str]]:
+    """One process, one thread, one case after another. A group that fails has no times but a note that says why."""
     limit = CELL_LIMIT * ROUNDS
     work = [
         Job(group[0][0].case, "timing", "impactbench.reports.cell:time_cells", (group, ROUNDS), limit)
         for group in groups
     ]
     times: dict[str, list[float]] = {}
+    notes: list[str] = []
     for done, outcome in enumerate(run_jobs(work, 1), 1):
         if outcome.state == "done":
             assert isinstance(outcome.value, dict)
             times |= outcome.value
+        else:
+            notes.append(f"{outcome.key} was not timed: {outcome.state} ({outcome.reason})")
         progress("timing", done, len(work))
-    return times
+    return times, notes
 
 
 def _cell_record(cell: Cell, contestant: Contestant, outcome: dict[str, Any]) -> dict[str, Any]:

@@ -173,6 +173,15 @@ def test_a_fault_costs_exactly_its_own_cells(monkeypatch: pytest.MonkeyPatch) ->
     assert time.monotonic() - begun < 30
 
 
+def test_a_case_that_cannot_be_timed_says_so_and_keeps_its_accuracy() -> None:
+    contestants = select_contestants([f"{FAKES}:Clockless"])
+    plan = comparison.Plan(select(["free_flight[dimension=1]"]), contestants, ("1/30",))
+    document = comparison.compare(plan, "test")
+    assert [cell["state"] for cell in document["cells"]] == ["ok"]
+    assert any("was not timed: crashed (SIGSEGV)" in note for note in document["provenance"]["notes"])
+    assert not any(row["measure"] == "wall_time" for row in document["rows"])
+
+
 def test_a_results_file_is_whole_or_the_old_one(tmp_path: Path) -> None:
     path = tmp_path / "results.json"
     results.save({"schema": 1, "cells": [], "rows": []}, path)

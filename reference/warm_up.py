@@ -1,0 +1,17 @@
+"""Compile the kernels of both runners, so that later processes load them from disk."""
+
+from __future__ import annotations
+
+from impactbench.reference.contestant import Stepped
+from impactbench.reference.exact_contestant import Exact
+from impactbench.scenarios.records import Body, HalfSpace, Model, Scene, Sphere
+
+
+def warm_up(_: object = None) -> None:
+    """Run every kernel once: a ball falls on a floor under either law."""
+    ball = Body("ball", Sphere(0.5), 1.0, (0.0, 0.0, 1.0))
+    floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), None, (0.0, 0.0, 0.0))
+    scene = Scene("warm_up", (ball, floor), 1.0, Model((2,), gravity=True), 1.0, 1.0, 1.0, gravity=(0.0, 0.0, -9.81))
+    for law in scene.laws:
+        Stepped(scene, law, "stepped", scene.model, 1 / 60).advance(1)
+        Exact(scene, law, "exact", scene.model, 1 / 60).advance(1)
