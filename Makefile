@@ -6,7 +6,7 @@ STAMP := $(VENV)/installed
 # mypy and import-linter do not follow the editable finder; they do follow a folder of links.
 LINKS := $(VENV)/links
 
-.PHONY: compare test check format lint types layers tests picture lock clean
+.PHONY: compare test check format lint types layers tests browsers picture lock clean
 
 compare: $(STAMP)
 	$(BIN)/impactbench compare --out out $(ARGS)
@@ -38,6 +38,11 @@ $(STAMP): requirements.lock pyproject.toml
 	mkdir -p $(LINKS)/impactbench
 	for part in scenarios reference adapters reports; do ln -sfn ../../../$$part $(LINKS)/impactbench/$$part; done
 	touch $@
+
+# Browsers for the report's tests, from Debian's packages; needs root.
+browsers:
+	command -v chromedriver && command -v chromium && command -v firefox-esr \
+	  || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver firefox-esr)
 
 # The README's picture, from a real run: needs Debian's chromium.
 picture: out/report.html
