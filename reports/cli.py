@@ -81,11 +81,14 @@ def compare(
 
 
 def _write(document: dict[str, Any], folder: Path) -> None:
-    from impactbench.reports import page, results
+    from impactbench.reports import page, results, sections
 
     try:
+        document = sections.with_sections(document, folder)
         results.save(document, folder / "results.json")
         page.write_page(document, folder / "report.html")
+    except results.ResultsError as error:
+        raise click.UsageError(str(error)) from None
     except OSError as error:
         message = f"cannot write to {folder}: {error.strerror}; earlier files there are untouched"
         raise click.UsageError(message) from None

@@ -41,14 +41,19 @@ def save(document: dict[str, Any], path: Path) -> None:
     write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
-def read(path: Path) -> dict[str, Any]:
-    """The document at `path`. Raises ResultsError where it is missing, broken or of another schema."""
+def load_json(path: Path) -> Any:
+    """What the JSON file at `path` holds. Raises ResultsError where it is missing or broken."""
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ResultsError(f"cannot read {path}: {error.strerror}; `impactbench compare` writes one") from None
     except ValueError as error:
         raise ResultsError(f"{path} is not a results file: {error}") from None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The document at `path`. Raises ResultsError where it is missing, broken or of another schema."""
+    document = load_json(path)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
         raise ResultsError(

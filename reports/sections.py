@@ -1,0 +1,45 @@
+"""Sections of the report that commands of their own measure: hard cases, breaking points, metamorphic relations, ...
+
+Such a command writes its part to OUT/<key>.json. Whoever writes OUT/results.json takes along the parts found there
+under "sections", so that the page holds nothing that is not in results.json.
+"""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from impactbench.reports import results
+
+SECTIONS: dict[str, tuple[str, str]] = {}
+"""Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""
+
+
+def attach(folder: Path, key: str, part: dict[str, Any]) -> None:
+    """Write OUT/<key>.json, and results.json and the report again where there are some. Raises OSError, ResultsError."""
+    from impactbench.reports import page
+
+    results.save(part, folder / f"{key}.json")
+    if (folder / "results.json").exists():
+        document = with_sections(results.read(folder / "results.json"), folder)
+        results.save(document, folder / "results.json")
+        page.write_page(document, folder / "report.html")
+
+
+def with_sections(document: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The document with the parts that stand beside it."""
+    parts = {key: results.load_json(folder / f"{key}.json") for key in SECTIONS if (folder / f"{key}.json").exists()}
+    return {**document, "sections": {**document.get("sections", {}), **parts}}
+
+
+def views(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """What the page shows: one entry a part, with its key, template and values."""
+    found = []
+    for key, part in document.get("sections", {}).items():
+        if key in SECTIONS:
+            template, place = SECTIONS[key]
+            module, _, function = place.partition(":")
+            view = getattr(importlib.import_module(module), function)
+            found.append({"key": key, "template": template, "view": view(part)})
+    return found
