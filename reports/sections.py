@@ -17,7 +17,10 @@ SECTIONS: dict[str, tuple[str, str]] = {}
 
 
 def attach(folder: Path, key: str, part: dict[str, Any]) -> None:
-    """Write OUT/<key>.json, and results.json and the report again where there are some. Raises OSError, ResultsError."""
+    """Write OUT/<key>.json; where results.json stands beside it, write that and the report again.
+
+    Raises OSError or ResultsError.
+    """
     from impactbench.reports import page
 
     results.save(part, folder / f"{key}.json")
