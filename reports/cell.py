@@ -21,7 +21,7 @@ from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case
 
 MOST_GAPS = 50_000_000
-"""Gaps of pairs over all steps of a scene file's run: some 60 bytes each, 3 GB."""
+"""Gaps of pairs over all steps of a run: some 60 bytes each, 3 GB. Scene files and hard cases can ask for more."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def build(cell: Cell, contestant: Contestant, halving: int = 1) -> Engine:
 def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
     """State, reason, settings and figures of one cell, recorded at every step."""
     cell, contestant = argument
-    if cell.scene and (reason := too_large(cell.scene, cell.step_seconds)):
+    if reason := too_large(case_of(cell).scene, cell.step_seconds):
         return {"state": "unsupported", "reason": reason}
     try:
         engine = build(cell, contestant)

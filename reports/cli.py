@@ -255,7 +255,10 @@ def list_(what: str, pair_laws: bool) -> None:
 
     from impactbench.reports import terminal
 
-    parts: dict[str, Callable[[], str]] = {"scenarios": terminal.scenario_table, "engines": terminal.engine_table}
+    parts: dict[str, Callable[[], str]] = {
+        "scenarios": lambda: terminal.scenario_table() + "\n" + terminal.hard_table(),
+        "engines": terminal.engine_table,
+    }
     click.echo("\n".join(parts[name]() for name in parts if what in (name, "all")))
     if pair_laws:
         from impactbench.reports.pair_laws import measured_laws

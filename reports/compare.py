@@ -18,6 +18,7 @@ from impactbench.reports import results
 from impactbench.reports.cell import Cell, step_seconds, timing_figures
 from impactbench.reports.measures import Figure, law_difference
 from impactbench.scenarios.catalogue import FAMILIES
+from impactbench.scenarios.hard import HARD
 from impactbench.scenarios.records import Law
 from impactbench.scenarios.truth import Case
 
@@ -202,7 +203,7 @@ def _cell_record(cell: Cell, contestant: Contestant, outcome: dict[str, Any]) ->
 def describe(case: Case) -> dict[str, Any]:
     """What a reader of the report needs to know of a case."""
     scene = case.scene
-    family = FAMILIES.get(scene.family)
+    family = FAMILIES.get(scene.family) or HARD.get(scene.family)
     return {
         "name": scene.name,
         "family": scene.family,

@@ -10,6 +10,7 @@ from typing import Any
 
 from impactbench.adapters import contestants
 from impactbench.scenarios.catalogue import FAMILIES
+from impactbench.scenarios.hard import HARD
 from rich.console import Console
 from rich.table import Table
 
@@ -87,6 +88,16 @@ def scenario_table() -> str:
         kind = ", ".join(sorted(kinds))
         rows.append([family.name, str(len(cases)), " ".join(laws), kind, family.needs, family.question])
     return table(["scenario", "cases", "laws", "truth", "needs", "question"], rows)
+
+
+def hard_table() -> str:
+    """The hard families, which take part only when named."""
+    rows = []
+    for family in HARD.values():
+        knob = family.knob.parameter if family.knob else "-"
+        rows.append([family.name, str(len(family.values)), str(len(family.full)), knob, family.needs, family.question])
+    columns = ["hard scenario", "cases", "with --full", "breaking point", "needs", "question"]
+    return table(columns, rows) + "\n"
 
 
 def engine_table() -> str:

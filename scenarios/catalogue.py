@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from impactbench.scenarios import flight, gravity_drops, lines, pairs, rigid, rolling, sliding, walls
+from impactbench.scenarios import flight, gravity_drops, hard, lines, pairs, rigid, rolling, sliding, walls
 from impactbench.scenarios.scene_file import is_scene_file, read_case
 from impactbench.scenarios.scene_values import SceneError, printable
 from impactbench.scenarios.truth import Case, Family
@@ -26,6 +26,8 @@ FAMILIES: dict[str, Family] = {
         *rigid.FAMILIES,
     )
 }
+
+KNOWN = (*FAMILIES, *hard.HARD)
 
 
 class UnknownCase(ValueError):
@@ -47,17 +49,22 @@ def select(patterns: Sequence[str] = ()) -> list[Case]:
 
     A pattern is a family's name, a case's name, or either with * and ? in it.
     Brackets stand for themselves, as case names hold them. A pattern that ends in .toml, .xml or .urdf is the path of a
-    scene file; such cases come last.
+    scene file; such cases come last. Hard cases come before them, and only for a pattern that names no other case.
     """
     files = [pattern for pattern in patterns if is_scene_file(pattern)]
     if files:
         named = [pattern for pattern in patterns if not is_scene_file(pattern)]
         return [*(select(named) if named else []), *_read(files)]
-    matchers = [_matcher(pattern) for pattern in patterns]
+    matchers = [hard.glob(pattern) for pattern in patterns]
+    hard_cases: dict[str, Case] = {}
     for pattern, matcher in zip(patterns, matchers, strict=True):
         if not any(_named(case, matcher) for case in _catalogue()):
-            raise UnknownCase(_complaint(pattern))
-    return [c for c in _catalogue() if not matchers or any(_named(c, m) for m in matchers)]
+            found = hard.select(pattern)
+            if not found:
+                raise UnknownCase(_complaint(pattern))
+            hard_cases |= {case.scene.name: case for case in found}
+    core = [c for c in _catalogue() if not matchers or any(_named(c, m) for m in matchers)]
+    return [*core, *hard_cases.values()]
 
 
 def _read(files: Sequence[str]) -> list[Case]:
@@ -66,16 +73,12 @@ def _read(files: Sequence[str]) -> list[Case]:
     for file in dict.fromkeys(files):
         case = read_case(file)
         name, family = case.scene.name, case.scene.family
-        if not family or family in FAMILIES:
+        if not family or family in FAMILIES or family in hard.HARD:
             raise SceneError(f"{printable(Path(file).name)}: name {name!r} is kept for the catalogue; choose another")
         if name in cases:
             raise SceneError(f"{printable(Path(file).name)}: another of these scene files is named {name!r} too")
         cases[name] = case
     return list(cases.values())
-
-
-def _matcher(pattern: str) -> re.Pattern[str]:
-    return re.compile(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."))
 
 
 def _named(case: Case, matcher: re.Pattern[str]) -> bool:
@@ -86,7 +89,9 @@ def _complaint(pattern: str) -> str:
     """One line: the cases of the family where the family is known, else the nearest names of any kind."""
     names = [case.scene.name for case in _catalogue()]
     family = pattern.partition("[")[0]
-    known = [n for n in names if n.startswith(f"{family}[")] if family in FAMILIES else [*FAMILIES, *names]
+    if family in hard.HARD:
+        names = hard.HARD[family].names()
+    known = [n for n in names if n.startswith(family)] if family in KNOWN else [*KNOWN, *names]
     nearest = difflib.get_close_matches(pattern, known, n=3, cutoff=0.4) or known[:3]
-    families = "" if family in FAMILIES else f" (families: {', '.join(FAMILIES)})"
+    families = "" if family in KNOWN else f" (families: {', '.join(KNOWN)})"
     return f"unknown case {pattern!r}; nearest: {', '.join(nearest)}{families}"
