@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from impactbench.reports.cli_check import check, explain
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
 if TYPE_CHECKING:
@@ -264,6 +265,10 @@ def list_(what: str, pair_laws: bool) -> None:
         from impactbench.reports.pair_laws import measured_laws
 
         click.echo("\n" + terminal.pair_law_table(measured_laws()))
+
+
+main.add_command(check)
+main.add_command(explain)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,86 @@
+"""Verdicts for a terminal and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from impactbench.reports.terminal import table
+from impactbench.reports.verdicts import Verdict, counts
+
+MOST_LINES = 40
+"""Failures listed in full; the rest are counted."""
+
+
+def figure(value: float, unit: str) -> str:
+    """A number with its unit; 1 is a fraction of the scene's scale and goes without."""
+    return "-" if not math.isfinite(value) else f"{value:.3g}" + ("" if unit == "1" else f" {unit}")
+
+
+def line(verdict: Verdict) -> str:
+    """One verdict in one line."""
+    head = f"{verdict.status.upper()} {verdict.check}: {verdict.where} law {verdict.law}: "
+    if math.isfinite(verdict.value) and verdict.status == "failed":
+        return head + (
+            f"{verdict.measure} {figure(verdict.value, verdict.unit)}, budget {figure(verdict.budget, verdict.unit)}"
+        )
+    return head + verdict.reason
+
+
+def text(verdicts: Sequence[Verdict]) -> str:
+    """Failures, a table by contestant, and all counts."""
+    bad = [verdict for verdict in verdicts if verdict.status in ("failed", "error", "unavailable")]
+    lines = [line(verdict) for verdict in bad[:MOST_LINES]]
+    if len(bad) > MOST_LINES:
+        lines.append(f"... and {len(bad) - MOST_LINES} more")
+    if lines:
+        lines.append("")
+    return "\n".join([*lines, by_contestant(verdicts), "", totals(verdicts)])
+
+
+def by_contestant(verdicts: Sequence[Verdict]) -> str:
+    names = list(dict.fromkeys(verdict.contestant for verdict in verdicts))
+    columns = list(counts(()))
+    rows = []
+    for name in names:
+        own = [verdict for verdict in verdicts if verdict.contestant == name]
+        failed = list(dict.fromkeys(verdict.check for verdict in own if verdict.status == "failed"))
+        rows.append([name, *(str(number) for number in counts(own).values()), ", ".join(failed) or "-"])
+    return table(["contestant", *columns, "failed checks"], rows)
+
+
+def totals(verdicts: Sequence[Verdict]) -> str:
+    """All counts, always in the same order, and how many passed only by an entry of a budget file."""
+    parts = [f"{number} {status}" for status, number in counts(verdicts).items()]
+    limited = sum(1 for verdict in verdicts if verdict.status == "passed" and verdict.limit)
+    return (
+        "checks: "
+        + ", ".join(parts)
+        + (f"; {limited} passed by a limit that is not the derived one" if limited else "")
+    )
+
+
+def margins(verdicts: Sequence[Verdict]) -> str:
+    """Per check and contestant the largest share of its budget that was used, and where."""
+    worst: dict[tuple[str, str, str], Verdict] = {}
+    for verdict in verdicts:
+        if verdict.status in ("passed", "failed") and math.isfinite(verdict.value):
+            key = (verdict.check, verdict.contestant, "limit" if verdict.limit else "derived")
+            if key not in worst or verdict.margin > worst[key].margin:
+                worst[key] = verdict
+    rows = [
+        [check, name, kind, figure(v.value, v.unit), figure(v.budget, v.unit), f"{v.margin:.2g}", v.case]
+        for (check, name, kind), v in worst.items()
+    ]
+    return table(["check", "contestant", "budget", "worst", "allowed", "share", "case"], sorted(rows))
+
+
+def as_json(verdicts: Sequence[Verdict], document: Mapping[str, Any], code: int) -> dict[str, Any]:
+    """Everything a program needs; numbers that are none are null."""
+    rows = [
+        {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in asdict(verdict).items()}
+        for verdict in verdicts
+    ]
+    return {"exit_code": code, "counts": counts(verdicts), "provenance": document["provenance"], "verdicts": rows}
