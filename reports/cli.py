@@ -44,6 +44,7 @@ def main() -> None:
 @click.option("--phases", type=click.IntRange(1, 64), default=3, show_default=True, help=PHASES_HELP)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Cells run at once. Default: cores.")
+@click.option("--replay/--no-replay", default=True, help="Record a case of each family for the report's replay.")
 def compare(
     cases: tuple[str, ...],
     engines: tuple[str, ...],
@@ -55,6 +56,7 @@ def compare(
     phases: int,
     out: Path,
     jobs: int,
+    replay: bool,
 ) -> None:
     """Run scenarios on all contestants and write OUT/results.json and OUT/report.html.
 
@@ -67,9 +69,8 @@ def compare(
     from impactbench.reports.compare import compare as run_comparison
 
     models = ("minimal", "full") if model == "both" else (model,)
-    plan = Plan(
-        chosen, contestants, steps or LADDER, law, models, tuple(k / phases for k in range(phases)), jobs, timing
-    )
+    shifts = tuple(k / phases for k in range(phases))
+    plan = Plan(chosen, contestants, steps or LADDER, law, models, shifts, jobs, timing, replay)
     with progress_bar() as progress:
         document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
     _write(document, folder)

@@ -17,6 +17,7 @@ from impactbench.adapters.isolation import Job, Outcome, run_jobs
 from impactbench.reports import results
 from impactbench.reports.cell import Cell, step_seconds, timing_figures
 from impactbench.reports.measures import Figure, law_difference
+from impactbench.reports.replay import replays
 from impactbench.scenarios.catalogue import FAMILIES
 from impactbench.scenarios.hard import HARD
 from impactbench.scenarios.records import Law
@@ -45,6 +46,7 @@ class Plan:
     """What to run. `law` is for the contestants that can choose theirs.
 
     Cases that are timed run at every one of `phases` [steps], so that no lucky step earns a rung; others at the first.
+    `replay`: record one case of each family for the report's replay.
     """
 
     cases: Sequence[Case]
@@ -55,6 +57,7 @@ class Plan:
     phases: Sequence[float] = (0.0,)
     jobs: int = 1
     timing: str = "some"
+    replay: bool = False
 
     def timed(self) -> set[str]:
         """Names of the cases to time. `some`: those of `TIMED`, and one of each family where few are asked for."""
@@ -64,6 +67,13 @@ class Plan:
         first = {case.scene.family: case.scene.name for case in reversed(self.cases)}
         few = first if len(first) <= len(TIMED) else {}
         return set((few | {name.partition("[")[0]: name for name in TIMED if name in names}).values())
+
+    def replayed(self) -> list[str]:
+        """Names of the cases to record: of each family the one that is timed, else its first."""
+        timed = self.timed()
+        first = {case.scene.family: case.scene.name for case in reversed(self.cases)}
+        first |= {case.scene.family: case.scene.name for case in reversed(self.cases) if case.scene.name in timed}
+        return list(dict.fromkeys(first[case.scene.family] for case in self.cases))
 
     def cells(self) -> list[Entry]:
         """In an order that keeps an engine's cells together."""
@@ -110,6 +120,11 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
     outcomes = accuracy_lane(cells, plan.jobs, progress)
     timings, untimed = timing_lane(_timed(plan, cells, outcomes), progress)
     document["provenance"]["notes"] += untimed
+    if plan.replay:
+        progress("replays", 0, 1)
+        cases = {case.scene.name: case for case in plan.cases}
+        document["replays"] = replays(cases, plan.replayed(), cells, outcomes, plan.jobs)
+        progress("replays", 1, 1)
     for cell, contestant in cells:
         outcome = outcomes[cell.key]
         document["cells"].append(_cell_record(cell, contestant, outcome))

@@ -16,7 +16,12 @@ def masses(scene: Scene) -> Floats:
 
 
 def momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, pairs: list[PairHistory]) -> float:
-    """Largest norm of the momentum that no contact could have given, relative to the largest sum of m |v|.
+    """Largest of `momentum_drifts`."""
+    return float(momentum_drifts(scene, law, trajectory, pairs).max())
+
+
+def momentum_drifts(scene: Scene, law: Law, trajectory: Trajectory, pairs: list[PairHistory]) -> Floats:
+    """Norm of the momentum that no contact could have given, relative to the run's largest sum of m |v|, shape [T].
 
     Without statics that is P - P0 - M g t. A static gives impulses along its normal while it is touched and, with
     Coulomb friction, up to mu times that along its plane; under the documents' law an impact with b < 1 or viscous
@@ -34,7 +39,7 @@ def momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, pairs: list[P
     if with_statics:
         excess = _outside_contacts(scene, law, excess, steps, with_statics)
     drift = np.linalg.norm(np.cumsum(excess, axis=0), axis=1)
-    return float(drift.max(initial=0.0)) / scale
+    return np.concatenate([[0.0], drift]) / scale
 
 
 def _outside_contacts(scene: Scene, law: Law, excess: Floats, steps: Floats, pairs: list[PairHistory]) -> Floats:
@@ -71,8 +76,14 @@ def _impossible_part(
 
 
 def angular_momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, impacts: list[Impact]) -> float | None:
-    """Largest change of the angular momentum about the common centre of mass, over the largest sum of m |r| |v| and
-    spin.
+    """Largest of `angular_momentum_drifts`; None where the law does not conserve it."""
+    drifts = angular_momentum_drifts(scene, law, trajectory, impacts)
+    return None if drifts is None else float(drifts.max())
+
+
+def angular_momentum_drifts(scene: Scene, law: Law, trajectory: Trajectory, impacts: list[Impact]) -> Floats | None:
+    """Change of the angular momentum about the common centre of mass, over the largest sum of m |r| |v| and spin,
+    shape [T].
 
     None where the law does not conserve it: with statics, or with friction between bodies whose rotation is not
     modelled. Under the documents' law particle spheres change it by exactly -(1 - b) mu_r (R_A + R_B) n x u_p in
@@ -96,7 +107,7 @@ def angular_momentum_drift(scene: Scene, law: Law, trajectory: Trajectory, impac
         for impact in impacts:
             expected[impact.last_step + 1 :] += _shared_sliding(scene, impact)
     largest = float(scale.max())
-    return float(np.linalg.norm(total - total[0] - expected, axis=1).max()) / largest if largest > 0 else 0.0
+    return np.asarray(np.linalg.norm(total - total[0] - expected, axis=1) / (largest if largest > 0 else 1.0))
 
 
 def _shared_sliding(scene: Scene, impact: Impact) -> Floats:

@@ -80,7 +80,7 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
     steps = np.diff(trajectory.times)
     gravity = np.array(scene.gravity)
     weight = float(np.linalg.norm(gravity))
-    active = [_active_steps(scene, pair, steps, gravity) for pair in pairs]
+    active = [active_steps(scene, pair, steps, gravity) for pair in pairs]
     busy = {index: np.zeros(len(steps), dtype=np.int64) for index in range(len(scene.bodies))}
     for pair, flags in zip(pairs, active, strict=True):
         for index in (pair.a, pair.b):
@@ -91,7 +91,7 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
     found = []
     for pair, flags in zip(pairs, active, strict=True):
         movable = [index for index in (pair.a, pair.b) if not scene.bodies[index].static]
-        for first, last in _episodes(flags):
+        for first, last in episodes(flags):
             closing = -float(pair.relative[first] @ pair.normal[first])
             alone = all((busy[index][first : last + 1] == 1).all() for index in movable)
             settled = last + 1 < len(steps) or first == last
@@ -104,7 +104,7 @@ def find_impacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory])
     return sorted(found, key=lambda impact: impact.time)
 
 
-def _active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Floats) -> Flags:
+def active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Floats) -> Flags:
     """Steps in which the relative velocity changes along the normal by more than gravity does, while the pair is
     near contact.
     """
@@ -117,7 +117,7 @@ def _active_steps(scene: Scene, pair: PairHistory, steps: Floats, gravity: Float
     return np.asarray(near & (kick > JUMP * scene.speed + 1e-9 * np.abs(fall).sum() * steps))
 
 
-def _episodes(flags: Flags) -> Iterator[tuple[int, int]]:
+def episodes(flags: Flags) -> Iterator[tuple[int, int]]:
     """First and last step of every run of set flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     yield from ((int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2))

@@ -104,15 +104,19 @@ def _conserved(
 
 
 def _expected_energy(scene: Scene, law: Law, truth: Truth, trajectory: Trajectory, delay: float) -> float | None:
-    """Energy the law leaves at the end [J]: the truth's, or the initial one where nothing dissipates."""
-    end = truth.state(float(trajectory.times[-1]) - delay)
+    return expected_energy(scene, law, truth, float(trajectory.times[-1]) - delay, _at(trajectory, 0))
+
+
+def expected_energy(scene: Scene, law: Law, truth: Truth, time: float, start: Trajectory) -> float | None:
+    """Energy the law leaves at `time` [J]: the truth's, or that of the run's `start` where nothing dissipates."""
+    end = truth.state(time)
     if end is None:
         contacts = [scene.contact, *(contact for _, _, contact in scene.pairs)]
         lossless = all(c.bounciness == 1 and (c.friction if law == "nc" else c.viscosity) == 0 for c in contacts)
-        return float(conservation.energies(scene, _at(trajectory, 0))[0]) if lossless else None
-    turning = trajectory.spins is not None and end.spins is not None and end.orientations is not None
+        return float(conservation.energies(scene, start)[0]) if lossless else None
+    turning = start.spins is not None and end.spins is not None and end.orientations is not None
     snapshot = Trajectory(
-        trajectory.times[-1:],
+        np.array([time]),
         end.positions[None],
         end.velocities[None],
         end.orientations[None] if turning and end.orientations is not None else None,

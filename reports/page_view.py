@@ -295,7 +295,7 @@ class View:
         brief = self.rungs[columns].astype(object).where(self.rungs[columns].notna(), None)
         whole = "The raw rows are too large for this page and are in the results file beside it"
         return [
-            ([], self.document),
+            ([], {key: part for key, part in self.document.items() if key != "replays"}),  # embedded by itself
             ([f"{whole}; embedded here is the worst phase of every rung."], brief.to_dict("records")),
             ([f"{whole}; no data is embedded here."], None),
         ]
