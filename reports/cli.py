@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from impactbench.reports.cli_check import check, explain
+from impactbench.reports.cli_metamorphic import metamorphic
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
 if TYPE_CHECKING:
@@ -270,6 +271,7 @@ def list_(what: str, pair_laws: bool) -> None:
 
 main.add_command(check)
 main.add_command(explain)
+main.add_command(metamorphic)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ from typing import Any
 
 from impactbench.reports import results
 
-SECTIONS: dict[str, tuple[str, str]] = {}
+SECTIONS: dict[str, tuple[str, str]] = {
+    "metamorphic": ("metamorphic.html", "impactbench.reports.metamorphic:view"),
+}
 """Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""
 
 
