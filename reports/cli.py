@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from impactbench.reports.cli_check import check, explain
 from impactbench.reports.cli_metamorphic import metamorphic
+from impactbench.reports.cli_sweep import Sweep, export, sweep_options
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def main() -> None:
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Cells run at once. Default: cores.")
 @click.option("--replay/--no-replay", default=True, help="Record a case of each family for the report's replay.")
+@sweep_options
 def compare(
     cases: tuple[str, ...],
     engines: tuple[str, ...],
@@ -58,6 +60,7 @@ def compare(
     out: Path,
     jobs: int,
     replay: bool,
+    sweep: Sweep,
 ) -> None:
     """Run scenarios on all contestants and write OUT/results.json and OUT/report.html.
 
@@ -71,10 +74,21 @@ def compare(
 
     models = ("minimal", "full") if model == "both" else (model,)
     shifts = tuple(k / phases for k in range(phases))
+    timing = "all" if sweep.full else timing
     plan = Plan(chosen, contestants, steps or LADDER, law, models, shifts, jobs, timing, replay)
-    with progress_bar() as progress:
-        document = run_comparison(plan, shlex.join(["impactbench", *sys.argv[1:]]), progress)
+    cache = sweep.cache_in(folder)
+    with sweep.executor() as executor, progress_bar() as progress:
+        document = run_comparison(
+            plan,
+            shlex.join(["impactbench", *sys.argv[1:]]),
+            progress,
+            cache=cache,
+            executor=executor,
+            time_on_workers=sweep.time_on_workers,
+        )
     _write(document, folder)
+    if cache:
+        cache.prune()
     from impactbench.reports.terminal import summary
 
     click.echo(summary(document))
@@ -272,7 +286,7 @@ def list_(what: str, pair_laws: bool) -> None:
 main.add_command(check)
 main.add_command(explain)
 main.add_command(metamorphic)
-
+main.add_command(export)
 
 if __name__ == "__main__":
     main()

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import os
 import platform
-import subprocess
-from collections.abc import Callable, Iterable, Sequence
+import time
+from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 from impactbench.adapters.contestants import Contestant
 from impactbench.adapters.isolation import Job, Outcome, run_jobs
-from impactbench.reports import results
+from impactbench.reports import executors, machine, results
+from impactbench.reports.cache import Cache
 from impactbench.reports.cell import Cell, step_seconds, timing_figures
 from impactbench.reports.measures import Figure, law_difference
 from impactbench.reports.replay import replays
@@ -101,8 +102,21 @@ def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:
     return wanted if wanted in laws else laws[0]
 
 
-def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> dict[str, Any]:
-    """Run the plan and return the results document. One cell's fault costs that cell alone."""
+def compare(
+    plan: Plan,
+    command: str,
+    progress: Progress = lambda *_: None,
+    *,
+    cache: Cache | None = None,
+    executor: Executor | None = None,
+    time_on_workers: bool = False,
+) -> dict[str, Any]:
+    """Run the plan and return the results document. One cell's fault costs that cell alone.
+
+    `executor` takes the place of `plan.jobs` children here; times are taken here all the same, by one process, unless
+    `time_on_workers`: then by one worker. Raises executors.ClusterError where workers are not like this machine.
+    """
+    begun = time.monotonic()
     cells = plan.cells()
     load = os.getloadavg()[0]
     document: dict[str, Any] = {
@@ -117,9 +131,10 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
             for figure in law_difference(case)
         ],
     }
-    outcomes = accuracy_lane(cells, plan.jobs, progress)
-    timings, untimed = timing_lane(_timed(plan, cells, outcomes), progress)
-    document["provenance"]["notes"] += untimed
+    outcomes = accuracy_lane(cells, plan.jobs, progress, cache, executor)
+    timings, notes = timing_lane(_timed(plan, cells, outcomes), progress, executor if time_on_workers else None)
+    document["provenance"]["notes"] += [*(cache.notes(len(cells)) if cache else []), *notes]
+    document["provenance"]["cached_cells"] = cache.served if cache else 0
     if plan.replay:
         progress("replays", 0, 1)
         cases = {case.scene.name: case for case in plan.cases}
@@ -132,33 +147,53 @@ def compare(plan: Plan, command: str, progress: Progress = lambda *_: None) -> d
         figures = [*figures, *(timing_figures(timings[cell.key]) if timings.get(cell.key) else [])]
         index = len(document["cells"]) - 1
         document["rows"] += [{"cell": index, "measure": f.measure, "value": f.value, "unit": f.unit} for f in figures]
+    document["provenance"]["seconds"] = round(time.monotonic() - begun, 1)
     return document
 
 
-def accuracy_lane(cells: Sequence[Entry], jobs: int, progress: Progress) -> dict[str, dict[str, Any]]:
-    """Every cell once, in parallel; deterministic whatever the number of workers."""
+def accuracy_lane(
+    cells: Sequence[Entry],
+    jobs: int,
+    progress: Progress,
+    cache: Cache | None = None,
+    executor: Executor | None = None,
+) -> dict[str, dict[str, Any]]:
+    """Every cell once, in parallel; deterministic whatever the number of workers. What the cache holds is not run."""
     outcomes: dict[str, dict[str, Any]] = {}
     missing = {contestant.name: why for _, contestant in cells if (why := contestant.availability())}
+    work: dict[str, Entry] = {}
     for cell, contestant in cells:
         if contestant.name in missing:
             outcomes[cell.key] = {"state": "unavailable", "reason": missing[contestant.name]}
-    work = [
-        Job(cell.key, contestant.lane, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
-        for cell, contestant in cells
-        if contestant.name not in missing
-    ]
-    if any(job.lane == "reference" for job in work):
-        _compile_reference(progress)
-    for done, outcome in enumerate(run_jobs(work, jobs), 1):
+        elif cache and (stored := cache.get(cell, contestant)):
+            outcomes[cell.key] = stored
+        else:
+            work[cell.key] = (cell, contestant)
+    for done, outcome in enumerate(_run_cells(work.values(), jobs, progress, executor), 1):
         outcomes[outcome.key] = _as_cell(outcome)
+        if cache:
+            cache.put(*work[outcome.key], outcomes[outcome.key])
         progress("accuracy", done, len(work))
     return outcomes
 
 
+def _run_cells(
+    cells: Iterable[Entry], jobs: int, progress: Progress, executor: Executor | None
+) -> Generator[Outcome, None, None]:
+    work = [
+        Job(cell.key, contestant.lane, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
+        for cell, contestant in cells
+    ]
+    if executor:
+        return executors.run_on(executor, work)
+    if any(job.lane == "reference" for job in work):
+        _compile_reference(progress)
+    return run_jobs(work, jobs)
+
+
 def _compile_reference(progress: Progress) -> None:
-    """Compile the reference's kernels before any cell's clock runs: under a minute the first time, then stored."""
     progress("compiling the reference (first run only)", 0, 1)
-    for _ in run_jobs([Job("warm-up", "reference", "impactbench.reference.warm_up:warm_up", None, 600.0)], 1):
+    for _ in run_jobs([executors.WARM_UP], 1):
         progress("compiling the reference (first run only)", 1, 1)
 
 
@@ -179,23 +214,33 @@ def _timed(plan: Plan, cells: Sequence[Entry], outcomes: dict[str, dict[str, Any
     return list(groups.values())
 
 
-def timing_lane(groups: Sequence[list[Entry]], progress: Progress) -> tuple[dict[str, list[float]], list[str]]:
+def timing_lane(
+    groups: Sequence[list[Entry]], progress: Progress, executor: Executor | None = None
+) -> tuple[dict[str, list[float]], list[str]]:
     """One process, one thread, one case after another. A group that fails has no times but a note that says why."""
+    if not groups:
+        return {}, []
     limit = CELL_LIMIT * ROUNDS
     work = [
         Job(group[0][0].case, "timing", "impactbench.reports.cell:time_cells", (group, ROUNDS), limit)
         for group in groups
     ]
+    work = [machine.check_job("before"), *work, machine.check_job("after")]
     times: dict[str, list[float]] = {}
     notes: list[str] = []
-    for done, outcome in enumerate(run_jobs(work, 1), 1):
-        if outcome.state == "done":
+    checks: dict[str, Any] = {}
+    # All of them on one worker: times of two machines do not compare.
+    outcomes = executors.run_on(executor, work, len(work)) if executor else run_jobs(work, 1)
+    for done, outcome in enumerate(outcomes, 1):
+        if outcome.key in machine.CHECKS:
+            checks[outcome.key] = outcome.value
+        elif outcome.state == "done":
             assert isinstance(outcome.value, dict)
             times |= outcome.value
         else:
             notes.append(f"{outcome.key} was not timed: {outcome.state} ({outcome.reason})")
         progress("timing", done, len(work))
-    return times, notes
+    return times, [*machine.notes(checks, executor is not None), *notes]
 
 
 def _cell_record(cell: Cell, contestant: Contestant, outcome: dict[str, Any]) -> dict[str, Any]:
@@ -244,27 +289,10 @@ def provenance(command: str, contestants: Iterable[Contestant], load: float) -> 
         "impactbench": metadata.version("impactbench"),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "processor": _processor(),
+        "processor": machine.processor(),
         "cores": os.cpu_count() or 1,
-        "commit": _commit(),
+        "commit": machine.commit(),
         "versions": {c.engine: c.version() for c in contestants} | {"numpy": metadata.version("numpy")},
         "load": load,
         "notes": [f"the machine was busy when this began (load {load:.1f}): times may be too long"] if busy else [],
     }
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
-
-
-def _commit() -> str | None:
-    """Commit of the checkout this runs from; None for an installed package."""
-    command = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short=12", "HEAD"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return None

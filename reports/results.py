@@ -20,10 +20,15 @@ class ResultsError(Exception):
 
 def write_text(path: Path, text: str) -> None:
     """Replace `path` by a file with this text: readers see the old file or the new one, never a part."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Replace `path` by a file with this content: readers see the old file or the new one, never a part."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
         # mkstemp makes files private; a report is to be read by whoever may read its folder.
@@ -71,3 +76,23 @@ def frame(document: dict[str, Any]) -> pd.DataFrame:
     cells = pd.DataFrame(document["cells"]).rename_axis("cell").reset_index()
     rows = pd.DataFrame(document["rows"], columns=["cell", "measure", "value", "unit"])
     return cells.merge(rows, on="cell", how="left")
+
+
+def export(document: dict[str, Any], csv: Path | None, parquet: Path | None) -> pd.DataFrame:
+    """Write the frame of a document as CSV, Parquet or both, settings as JSON text; return it as written.
+
+    Raises ResultsError where Parquet's extra is missing, OSError where a file cannot be written.
+    """
+    table = frame(document)
+    table["settings"] = [json.dumps(settings, sort_keys=True) for settings in table["settings"]]
+    contents: dict[Path, bytes] = {}
+    if csv:
+        contents[csv] = table.to_csv(index=False).encode("utf-8")
+    if parquet:
+        try:
+            contents[parquet] = table.to_parquet(engine="pyarrow", index=False)
+        except ImportError:
+            raise ResultsError("--parquet needs pyarrow: pip install 'impactbench[parquet]'") from None
+    for path, content in contents.items():
+        write_bytes(path, content)
+    return table
