@@ -9,7 +9,7 @@ import importlib.util
 import platform
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import cast
@@ -74,6 +74,24 @@ CONTESTANTS = (
 )
 
 
+def _policy(engine: str, profile: str) -> Contestant:
+    return replace(next(known for known in CONTESTANTS if known.engine == engine), profile=profile)
+
+
+POLICIES = tuple(
+    _policy(engine, profile)
+    for engine, profile in (
+        ("pybullet", "iterations"),
+        ("pybullet", "swept"),
+        ("mujoco", "stiff"),
+        ("mujoco", "cushion"),
+        ("mujoco", "speculative"),
+        ("pymunk", "iterations"),
+        ("pymunk", "substeps"),
+    )
+)
+"""Settings that mend one kind of hard case and take part only when named in full; each adapter says what it sets."""
+
 GROUP = "impactbench.engines"
 """Entry points of this group are engines that other installed packages offer."""
 HINT = "installed; takes part when asked for by name"
@@ -103,9 +121,11 @@ def select(engines: Sequence[str] = (), profiles: Sequence[str] = ()) -> tuple[C
         if any(_matches(contestant, text) for contestant in CONTESTANTS):
             continue
         others = installed()
-        named = [contestant for contestant in others if text in (contestant.engine, contestant.name)]
+        named = [policy for policy in POLICIES if text == policy.name]
+        named += [contestant for contestant in others if text in (contestant.engine, contestant.name)]
         if not named:
-            known = [*_distinct("engine"), *_distinct("name"), *(contestant.engine for contestant in others)]
+            extra = [*(policy.name for policy in POLICIES), *(contestant.engine for contestant in others)]
+            known = [*_distinct("engine"), *_distinct("name"), *extra]
             raise _unknown("contestant", text, known)
         own += named
     for text in profiles:

@@ -32,8 +32,22 @@ try:
 except ImportError as error:
     raise Unavailable(f"mujoco cannot be imported: {error}") from error
 
-INTEGRATORS = {"tuned": "Euler", "implicit": "implicit", "implicitfast": "implicitfast", "rk4": "RK4"}
-"""By profile. The last three are for `reproduce`, of flights: one-step impacts need a step of one stage."""
+INTEGRATORS = {
+    "tuned": "Euler",
+    "stiff": "Euler",
+    "cushion": "Euler",
+    "speculative": "Euler",
+    "implicit": "implicit",
+    "implicitfast": "implicitfast",
+    "rk4": "RK4",
+}
+"""By profile. `stiff` and `cushion` answer every contact with the stiff spring of piles or the softer one (see
+`_normal`), whatever the scene's need; `speculative` adds the flag of that name, contacts before bodies touch, against
+tunnelling (MuJoCo 4.0, XML reference, option/flag). The last three are for `reproduce`, of flights: one-step impacts
+need a step of one stage."""
+STIFF, CUSHION = "{!r} 1", "{!r} {!r}"
+"""solref: the shortest time constant MuJoCo advises (2 h, critically damped; XML reference, solref), or a spring that
+takes back a fiftieth of an overlap per step while the damper stops the approach in one."""
 RIGID = "0.9999 0.9999 0.001 0.5 2"
 """solimp: constant impedance, or e would depend on depth."""
 LOST = (mj.mjtWarning.mjWARN_BADQPOS, mj.mjtWarning.mjWARN_BADQVEL, mj.mjtWarning.mjWARN_BADQACC)
@@ -43,6 +57,7 @@ FULL_BUFFERS = (mj.mjtWarning.mjWARN_CONTACTFULL, mj.mjtWarning.mjWARN_CNSTRFULL
 class MuJoCo:
     def __init__(self, scene: Scene, law: Law, profile: str, model: Model, step: float) -> None:
         self._scene, self._model, self._h = scene, model, step
+        self._profile = profile
         self._tuned, self._integrator = profile in INTEGRATORS, INTEGRATORS.get(profile, "Euler")
         self._rates = viscous_rates(scene, law, profile)
         self._axes = moving_axes(scene, model)
@@ -116,7 +131,9 @@ class MuJoCo:
             chosen = {"integrator": integrator, "cone": "elliptic", "tolerance": "1e-15"}
             option |= chosen
             self._settings |= chosen | {"autoreset": "disable"}
-            flag = '<flag autoreset="disable"/>'
+            ahead = ' speculative="enable"' if self._profile == "speculative" else ""
+            flag = f'<flag autoreset="disable"{ahead}/>'
+            self._settings |= {"speculative": "enable"} if ahead else {}
         else:
             self._settings["restitution"] = "none in MuJoCo; default solref (0.02, 1)"
             self._settings["cone"] = "not set (pyramidal: friction depends on the heading)"
@@ -154,10 +171,14 @@ class MuJoCo:
         return chosen
 
     def _normal(self, e: float) -> str:
+        if self._profile == "stiff":
+            return STIFF.format(2 * self._h)
+        if self._profile == "cushion":
+            return CUSHION.format(-0.02 / self._h**2, -1 / self._h)
         if self._need != "resting":
             return f"-1e-12 {-(1 + e) / self._h!r}"
         # Piles need overlaps pushed out. The stiff spring does it better, but throws piles up at coarse steps.
-        return f"{2 * self._h!r} 1" if self._h < 0.01 else f"{-0.02 / self._h**2!r} {-1 / self._h!r}"
+        return STIFF.format(2 * self._h) if self._h < 0.01 else CUSHION.format(-0.02 / self._h**2, -1 / self._h)
 
     def _grip(self, mu: float) -> float:
         """Damping [1/s] of slip: 1/h sticks within one step, as an impact needs, but makes lasting contacts hop.

@@ -49,6 +49,12 @@ LEFT_ALONE = {
     "useMaximalCoordinates": "not set (reduced coordinates)",
 }
 """The vendor's defaults that cause what the default profile shows."""
+ITERATIONS = {"numSolverIterations": 200}
+"""Profile `iterations`: the default with this one change (50 else), which PyBullet's Quickstart Guide names as what
+trades speed for accuracy (setPhysicsEngineParameter)."""
+SWEPT = 0.8
+"""Profile `swept`: radii of the ball that is swept along a fast body's path (changeDynamics, ccdSweptSphereRadius; the
+manual's remedy against tunnelling). It works in maximal coordinates only."""
 SURFACE = {"linearDamping": 0.0, "angularDamping": 0.0, "contactProcessingThreshold": 0.0}
 
 
@@ -67,9 +73,12 @@ class Bullet:
         self._c = c = _client()
         self._rotation = model.rotation
         self._published = PUBLISHED.get(profile)
-        self._tuned = profile == "tuned" or self._published is not None
+        self._tuned = profile in ("tuned", "swept") or self._published is not None
+        self._swept, self._iterations = profile == "swept", profile == "iterations"
         self._settings: dict[str, object] = {"combination": "product of surfaces"}
         self._maximal, self._locked = self._coordinates(scene, model, pairs) if self._tuned else (False, False)
+        if self._swept:
+            self._maximal, self._locked = True, False
         if not self._tuned:
             self._settings |= LEFT_ALONE
         pb.resetSimulation(c)
@@ -77,6 +86,12 @@ class Bullet:
         pb.setGravity(*gravity_of(scene, model), c)
         if self._tuned:
             self._tune(scene, model, pairs)
+        if self._iterations:
+            pb.setPhysicsEngineParameter(**ITERATIONS, physicsClientId=c)
+            self._settings |= ITERATIONS
+        if self._swept:
+            pb.setPhysicsEngineParameter(allowedCcdPenetration=0.0, physicsClientId=c)
+            self._settings |= {"ccdSweptSphereRadius": f"{SWEPT} radii", "allowedCcdPenetration": 0.0}
         self._shapes: dict[Shape, int] = {}
         handles = [
             self._add(body, bounce[i], rough[i], scene.collide, self._rates.get(i))
@@ -163,6 +178,8 @@ class Bullet:
             surface |= {"mass": body.mass, "localInertiaDiagonal": inertia}
             if rate is not None:
                 surface["linearDamping"] = -math.expm1(-rate / body.mass)
+        if self._swept and isinstance(body.shape, Sphere):
+            surface["ccdSweptSphereRadius"] = SWEPT * body.shape.radius
         if self._tuned and not self._maximal and body.mass is not None:
             surface["maxJointVelocity"] = 1e9  # else every velocity component is clamped to 100 silently
         pb.changeDynamics(handle, -1, **surface, physicsClientId=c)

@@ -100,13 +100,13 @@ def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
     try:
         case = case_of(cell)
         trajectory = record(engine, cell.step_seconds, step_count(case.scene, cell.step_seconds))
-        settings = {name: _plain(value) for name, value in engine.settings.items()}
+        settings = {name: plain(value) for name, value in engine.settings.items()}
     except Unsupported as why:  # an engine may find out only on the way, as when impacts accumulate
         return {"state": "unsupported", "reason": str(why)}
     finally:
         engine.close()
     if not trajectory.finite():
-        return {"state": "diverged", "reason": _first_divergence(trajectory), "settings": settings}
+        return {"state": "diverged", "reason": first_divergence(trajectory), "settings": settings}
     # A state that is finite yet absurd overflows in the measures: that run has diverged too.
     with np.errstate(over="ignore", invalid="ignore"):
         figures = measure(case, cell.law, trajectory, cell.phase * cell.step_seconds)
@@ -164,7 +164,7 @@ def stack(times: Floats, states: Sequence[State]) -> Trajectory:
     )
 
 
-def _first_divergence(trajectory: Trajectory) -> str:
+def first_divergence(trajectory: Trajectory) -> str:
     fine = np.isfinite(trajectory.positions).all(axis=2) & np.isfinite(trajectory.velocities).all(axis=2)
     if fine.all():
         return "orientation or spin is not finite"
@@ -172,7 +172,7 @@ def _first_divergence(trajectory: Trajectory) -> str:
     return f"body {row} is not finite at t = {trajectory.times[step]:.6g} s"
 
 
-def _plain(value: object) -> object:
+def plain(value: object) -> object:
     """A setting as JSON can hold it."""
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
 

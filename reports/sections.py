@@ -13,6 +13,7 @@ from typing import Any
 from impactbench.reports import results
 
 SECTIONS: dict[str, tuple[str, str]] = {
+    "hard": ("hard.html", "impactbench.reports.hard_view:view"),
     "metamorphic": ("metamorphic.html", "impactbench.reports.metamorphic:view"),
 }
 """Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""

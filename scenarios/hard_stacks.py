@@ -126,7 +126,7 @@ FAMILIES: tuple[HardFamily, ...] = (
         [{"shape": shape, "count": n} for shape in ("sphere", "box") for n in (5, 20, 50, 100)],
         full=({"shape": "box", "count": 200}, {"shape": "sphere", "count": 200}),
         knob=Knob("count", 2, 200, "int", criteria=("stands", "supported"), fixed={"shape": "box"}),
-        policies=("pybullet/iterations", "pymunk/iterations", "mujoco/stiff"),
+        policies=("pybullet/iterations", "pymunk/iterations", "mujoco/stiff", "mujoco/cushion"),
         seconds=120.0,
     ),
     hard_family(
@@ -137,7 +137,7 @@ FAMILIES: tuple[HardFamily, ...] = (
         column_criteria,
         [{"ratio": 10.0**k} for k in (0, 1, 2, 3, 4, 6)],
         knob=Knob("ratio", 1.0, 1e8, "log", criteria=("stands",)),
-        policies=("pybullet/iterations", "pymunk/iterations", "mujoco/stiff"),
+        policies=("pybullet/iterations", "pymunk/iterations", "mujoco/stiff", "mujoco/cushion"),
     ),
     hard_family(
         "light_on_heavy",
