@@ -7,16 +7,15 @@ turned back into data values, so that one pair of logarithmic scales carries the
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import altair as alt
 import pandas as pd
-import vl_convert
 from altair.utils.schemapi import debug_mode as debug_mode
 from impactbench.reports.chart_labels import LETTER, LINE, Box, between, place
-from impactbench.reports.page_data import FLOOR, isolated
+from impactbench.reports.page_data import FLOOR, TARGET, isolated
 
 # Okabe and Ito's palette without yellow (illegible on white) and black (illegible on a dark page).
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C")
@@ -113,24 +112,31 @@ def frame_of(rows: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def work_precision(
-    points: pd.DataFrame, failed: pd.DataFrame, style: Style, titles: tuple[str, str]
+    points: pd.DataFrame,
+    failed: pd.DataFrame,
+    style: Style,
+    titles: tuple[str, str],
+    limits: Sequence[tuple[float, str]] = (),
 ) -> alt.LayerChart | alt.FacetChart:
     """Cost against error, one line a policy in order of step.
 
     `points` has policy, engine, step, step_text, error, cost, low, high; `failed` has policy, engine, state, reason,
-    steps; `titles` are those of the two axes.
+    steps; `titles` are those of the two axes; `limits` are errors to draw a line at, with their names.
     """
     shown = points[points["error"] > FLOOR]
     costs = [*points["cost"], *points["low"].dropna(), *points["high"].dropna()]
     axes = Axes(
-        span([*shown["error"], 1e-2], 0.12), span([*costs, 1.6 * max(costs)], 0.15), FAIL_RAIL if len(failed) else 0
+        span([*shown["error"], TARGET, *(x for x, _ in limits if x > FLOOR)], 0.12),
+        span([*costs, 1.6 * max(costs)], 0.15),
+        FAIL_RAIL if len(failed) else 0,
     )
     spots = [axes.pixel(e, c) for e, c in zip(points["error"], points["cost"], strict=True)]
     points = points.assign(x=[axes.at_x(x) for x, _ in spots], y=points["cost"])
-    layers = [*rails(axes), *curves(points, style), *labels(points, spots, axes)]
+    layers = [*rails(axes), *target(axes), *bounds(limits, axes), *curves(points, style), *labels(points, spots, axes)]
     if len(failed):
         layers += fail_marks(failed, axes, style)
-    return alt.layer(*scaled(layers, axes, titles), config=theme(), width=WIDTH, height=HEIGHT)
+    aim = alt.param(name="target", value=TARGET)
+    return alt.layer(*scaled(layers, axes, titles), config=theme(), width=WIDTH, height=HEIGHT).add_params(aim)
 
 
 def scaled(layers: list[alt.Chart], axes: Axes, titles: tuple[str, str]) -> list[alt.Chart]:
@@ -139,12 +145,9 @@ def scaled(layers: list[alt.Chart], axes: Axes, titles: tuple[str, str]) -> list
     y_scale = alt.Scale(type="log", domain=[axes.at_y(HEIGHT), axes.at_y(0)], nice=False)
     x_axis = alt.Axis(values=decades(axes.x), format="~g", title=titles[0], labelExpr=POWER)
     y_axis = alt.Axis(values=decades(axes.y), format="~g", title=titles[1], labelExpr=POWER)
-    encoded = []
-    for layer in layers:
-        x = alt.X("x:Q", scale=x_scale, axis=x_axis)
-        y = alt.Y("y:Q", scale=y_scale, axis=y_axis)
-        encoded.append(layer.encode(x=x, y=y))
-    return encoded
+    first = layers[0].encode(x=alt.X("x:Q", scale=x_scale, axis=x_axis), y=alt.Y("y:Q", scale=y_scale, axis=y_axis))
+    # The layers share their scales: what the first says holds for all, and need not be said again.
+    return [first, *(layer.encode(x=alt.X("x:Q"), y=alt.Y("y:Q")) for layer in layers[1:])]
 
 
 # d3 has no format that writes 0.001 plainly and 1e-9 briefly.
@@ -158,7 +161,7 @@ def decades(log_span: tuple[float, float]) -> list[float]:
 
 
 def rails(axes: Axes) -> list[alt.Chart]:
-    """Bands left and right of the curves, the 1 % line and the corner to aim for."""
+    """Bands left and right of the curves, and the corner to aim for."""
     bands = [{"x": axes.at_x(0), "x2": axes.at_x(FLOOR_RAIL - 6)}]
     texts = [{"x": axes.at_x(4), "t": "floor"}]
     if axes.fail:
@@ -167,12 +170,31 @@ def rails(axes: Axes) -> list[alt.Chart]:
     bands = [{**b, "y": axes.at_y(HEIGHT), "y2": axes.at_y(0)} for b in bands]
     texts = [{**t, "y": axes.at_y(10)} for t in texts]
     texts.append({"x": axes.at_x(FLOOR_RAIL + 4), "y": axes.at_y(HEIGHT - 9), "t": "↙ better"})
-    texts.append({"x": axes.at_x(axes.pixel(1e-2, 1.0)[0] + 3), "y": axes.at_y(HEIGHT - 9), "t": "1 %"})
-    target = frame_of([{"x": 1e-2, "y": axes.at_y(0), "y2": axes.at_y(HEIGHT)}])
     return [
         alt.Chart(frame_of(bands)).mark_rect(opacity=0.07, fill=INK).encode(x2="x2:Q", y2="y2:Q"),
-        alt.Chart(target).mark_rule(color=INK, opacity=0.6, strokeDash=[2, 3]).encode(y2="y2:Q"),
         alt.Chart(frame_of(texts)).mark_text(align="left", fontSize=10, fontStyle="italic").encode(text="t:N"),
+    ]
+
+
+def target(axes: Axes) -> list[alt.Chart]:
+    """Line at the error target, which a script may move; not drawn where it would leave the part with curves."""
+    low, high = (axes.at_x(pixel) for pixel in (FLOOR_RAIL, WIDTH - axes.fail))
+    line = alt.Chart(frame_of([{"y": axes.at_y(0), "y2": axes.at_y(HEIGHT), "end": axes.at_y(HEIGHT - 9)}]))
+    line = line.transform_calculate(x="target", t="format(100 * target, '~g') + ' %'")
+    line = line.transform_filter(f"target > {low!r} && target < {high!r}")
+    text = line.transform_calculate(y="datum.end").mark_text(align="left", dx=3, fontSize=10, fontStyle="italic")
+    return [line.mark_rule(color=INK, opacity=0.6, strokeDash=[2, 3]).encode(y2="y2:Q"), text.encode(text="t:N")]
+
+
+def bounds(limits: Sequence[tuple[float, str]], axes: Axes) -> list[alt.Chart]:
+    """Named lines at errors that do not depend on a policy: what a frozen scene scores, what the truth is good for."""
+    rows = [{"x": x, "y": axes.at_y(0), "y2": axes.at_y(HEIGHT), "t": name} for x, name in limits if x > FLOOR]
+    if not rows:
+        return []
+    texts = [{**row, "y": axes.at_y(22 + 12 * k)} for k, row in enumerate(rows)]
+    return [
+        alt.Chart(frame_of(rows)).mark_rule(color=INK, opacity=0.5, strokeDash=[6, 3]).encode(y2="y2:Q"),
+        alt.Chart(frame_of(texts)).mark_text(align="left", dx=3, fontSize=10, fontStyle="italic").encode(text="t:N"),
     ]
 
 
@@ -265,9 +287,3 @@ def theme() -> alt.Config:
     text = alt.MarkConfig(color=INK, fill=INK)
     view = alt.ViewConfig(stroke=None)
     return alt.Config(background="transparent", font="system-ui, sans-serif", view=view, axis=axis, text=text)
-
-
-def svg_of(spec: dict[str, Any], prefix: str) -> str:
-    """Static drawing of a specification whose ids clash with no other chart's on the page."""
-    svg = str(vl_convert.vegalite_to_svg(spec))
-    return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{re.escape(prefix)}-", svg)

@@ -53,6 +53,9 @@ def environment() -> jinja2.Environment:
     found.filters.update(
         number=number, percent=percent, safe_json=safe_json, breakable=breakable, words=words, svg=Markup
     )
+    found.globals["script"] = lambda name: Markup(
+        (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
+    )
     found.trim_blocks = found.lstrip_blocks = True
     return found
 

@@ -5,12 +5,16 @@ A rung is one (case, policy, step); its figures are those of the worst impact ph
 
 from __future__ import annotations
 
+import decimal
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+TARGET = 0.01
+TARGETS = tuple(float(f"{digit}e{power}") for power in range(-6, 1) for digit in (1, 2, 5))[:-2]
+"""Targets the slider offers: 1 millionth to 1 in steps of 1, 2, 5."""
 FLOOR = 1e-12  # round-off of a computation in doubles at scene scale: below it no two errors can be told apart
 KEYS = ["case", "policy", "step"]
 
@@ -96,10 +100,11 @@ def order(line: pd.DataFrame) -> dict[str, Any] | None:
     if len(usable) < 3:
         return None
     x, y = np.log(usable["step"].to_numpy(float)), np.log(usable["error"].to_numpy(float))
-    slope = float(np.polyfit(x, y, 1)[0])
+    slope, offset = (float(c) for c in np.polyfit(x, y, 1))
     spread = float(np.std(x) * np.std(y))
     r2 = float(np.mean((x - x.mean()) * (y - y.mean())) / spread) ** 2 if spread > 0 else 0.0
-    return {"slope": slope, "r2": r2, "rungs": listing(usable["step_text"])}
+    fit = [(float(np.exp(end)), float(np.exp(offset + slope * end))) for end in (x[0], x[-1])]
+    return {"slope": slope, "r2": r2, "rungs": listing(usable["step_text"]), "fit": fit}
 
 
 def price(rung: pd.Series) -> str:
@@ -108,8 +113,6 @@ def price(rung: pd.Series) -> str:
     return f"{number(rung['cost'])} ({step})" if rung["timed"] else step
 
 
-def finding(rung: pd.Series, what: str, above: bool) -> str:
-    """One worst case in a sentence: who, what, where, and whether the limit of 1 % is kept."""
-    at = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
-    side = "above" if above else "within"
-    return f"{isolated(rung['policy'])} {what} in {isolated(rung['case'])}{at} ({side} the limit of 1 %)."
+def rounded_up(value: float) -> float:
+    """Three significant digits, rounded up: meets a target of as many digits exactly where `value` does."""
+    return float(decimal.Context(prec=3, rounding=decimal.ROUND_CEILING).create_decimal(repr(float(value))))

@@ -181,5 +181,6 @@ def _address(process: subprocess.Popen[bytes], log: Path) -> str:
         found = re.search(r"WebDriver BiDi listening on (ws://\S+)", log.read_text(errors="replace"))
         if found:
             return found[1]
-        assert process.poll() is None and time.monotonic() < end, log.read_text(errors="replace")
+        assert process.poll() is None, log.read_text(errors="replace")
+        assert time.monotonic() < end, "Firefox does not listen"
         time.sleep(0.05)

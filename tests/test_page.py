@@ -10,7 +10,7 @@ from typing import Any
 
 import altair as alt
 import pytest
-from impactbench.reports import page
+from impactbench.reports import page, page_verdict
 from impactbench.reports.page_data import time_to
 from impactbench.reports.page_view import View
 
@@ -122,18 +122,35 @@ def embedded(html: str, name: str) -> Any:
 
 def specs(html: str) -> list[str]:
     """Chart specifications on the page."""
-    return re.findall(r'<script type="application/json">(.*?)</script>', html, re.S)
+    return re.findall(r'<script type="application/json" class="spec">(.*?)</script>', html, re.S)
 
 
-def test_the_verdict_counts_the_cells_and_names_the_worst() -> None:
-    sentences = View(small()).verdict()
-    assert sentences[0].startswith("10 contestants compared on 2 cases at 6 step sizes (1/30 to 1/960 s): 21 of 27")
-    assert "1 timed out" in sentences[0]
-    assert "mujoco/tuned shows an energy gain of 86 % in bounce at 1/60 s" in sentences[1]
-    # 0.5 * 3.0 at the coarsest step
-    assert "pybullet/default shows an energy drift of −150 % in stacked_drop_3 at 1/30 s" in sentences[2]
-    # 3.0 * (30/960)**0.5 = 0.5303
-    assert "pybullet/default has a position error of 53 % at its finest step" in sentences[3]
+def test_the_verdict_says_what_holds_what_fails_and_what_to_take() -> None:
+    view = View(small())
+    assert page_verdict.coverage(view).startswith(
+        "10 contestants on 2 cases at 6 step sizes (1/30 to 1/960 s): 21 of 27 cells ran; "
+    )
+    assert "1 timed out" in page_verdict.coverage(view)
+    holds, fails, take = (line["text"] for line in page_verdict.verdict(view))
+    # Drift at the finest step: half of 0.02/32 and 0.08/32 (below 1 %), half of 3.0/32 = 4.7 %; mujoco gains 10 %.
+    assert holds == "within 1 % in every case at the finest step: energy by 1 of 4 contestants."
+    assert fails == "mujoco/tuned gains 86 % of the energy in bounce at 1/60 s (limit 1 %)."
+    # Errors at the finest steps below 1 %: mujoco/tuned in both cases, pybullet/default 3.0 / 32**0.5 in none.
+    assert take == (
+        "reference/events for stacked drop: cheapest below 1 % error, 0.1 ms per simulated second; "
+        "among engines mujoco/tuned, 0.8. Most cases: mujoco/tuned, 2 of 2."
+    )
+
+
+def test_the_verdict_names_a_loss_and_an_error_where_no_energy_is_gained() -> None:
+    maker = Maker()
+    maker.cell("a", "x/y", 60, {"position_error": 0.5, "energy_drift": -0.3})
+    assert "x/y loses 30 % of the energy in a at 1/60 s" in page_verdict.fails(View(document(maker, [case("a", "a")])))
+    maker = Maker()
+    maker.cell("a", "x/y", 60, {"position_error": 0.5, "energy_drift": -0.003})
+    assert page_verdict.fails(View(document(maker, [case("a", "a")]))) == (
+        "x/y has a position error of 50 % in a at 1/60 s (limit 1 %)."
+    )
 
 
 def test_time_to_a_fixed_error_is_the_cheapest_rung_that_stays_below(html: str) -> None:
@@ -168,6 +185,11 @@ def test_the_worst_phase_counts() -> None:
 
 def test_convergence_order_is_that_of_the_made_up_ladder(html: str) -> None:
     orders = View(small()).content()["sections"][1]["orders"]
+    # Drawn from end to end of the four finest rungs: 0.08 * 30/960 at 1/960, 0.08 * 30/120 at 1/120.
+    assert orders["mujoco/tuned"]["fit"] == [
+        pytest.approx((1 / 960, 0.0025), rel=1e-9),
+        pytest.approx((1 / 120, 0.02), rel=1e-9),
+    ]
     assert orders["mujoco/tuned"]["slope"] == pytest.approx(1.0)
     assert orders["pybullet/default"]["slope"] == pytest.approx(0.5)
     assert orders["mujoco/tuned"]["r2"] == pytest.approx(1.0)
@@ -219,7 +241,7 @@ def test_structure_for_readers_of_every_kind(html: str) -> None:
     assert len(ids) == len(set(ids))
     targets = {(attributes.get("href") or "")[1:] for tag, attributes in tags if tag == "a"}
     assert targets <= set(ids)
-    assert names.count("svg") == 2  # one static drawing a chart
+    assert names.count("svg") == 3  # two of speed against error, one of error against step
 
 
 @pytest.mark.parametrize(
@@ -235,9 +257,8 @@ def test_hostile_names_are_text_everywhere(name: str) -> None:
     assert name in outline.text
     assert not [tag for tag, _ in outline.tags if tag == "img"]
     assert "alert(2)" not in [text.strip() for text in re.findall(r"<script>(.*?)</script>", html, re.S)]
-    assert (
-        sum(tag == "script" for tag, _ in outline.tags) == 4
-    )  # one specification, the data, the bundle, the page's own
+    # A specification, its rungs, what the script needs, the data, the bundle, the page's own.
+    assert sum(tag == "script" for tag, _ in outline.tags) == 6
     assert embedded(html, "results") == found
 
 

@@ -1,0 +1,32 @@
+"""A chart's specification as the static drawing and the compact data that a page holds."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import vl_convert
+
+
+def svg_of(spec: dict[str, Any], prefix: str) -> str:
+    """Static drawing of a specification whose ids clash with no other chart's on the page, without what only a script
+    would use.
+    """
+    svg = str(vl_convert.vegalite_to_svg(spec))
+    svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{re.escape(prefix)}-", svg)
+    svg = re.sub(r'<path class="(?:background|foreground)"[^>]*?(?:display="none"|d="M0,0h0v0h0Z")[^>]*?/>', "", svg)
+    svg = re.sub(r' (?:aria-[a-z]+|role|pointer-events|font-family|class)="[^"]*"', "", svg)
+    svg = svg.replace(' opacity="1"', "").replace(' stroke-width="1"', "")
+    svg = re.sub(r"(\d\.\d)\d{2,}", r"\1", svg)  # a tenth of a pixel
+    described = f'<svg role="img" aria-label={quoteattr(str(spec.get("description", "chart")))}'
+    return svg.replace("<svg", described, 1)
+
+
+def rounded(value: Any) -> Any:
+    """The specification with six significant digits, which is far below a pixel."""
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, dict):
+        return {key: rounded(inner) for key, inner in value.items()}
+    return [rounded(inner) for inner in value] if isinstance(value, list) else value
