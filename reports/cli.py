@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 <<<<<<< HEAD
 from impactbench.reports.cli_check import check, explain
+from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
 from impactbench.reports.cli_sweep import Sweep, export, sweep_options
 =======
@@ -290,6 +291,7 @@ def list_(what: str, pair_laws: bool) -> None:
 <<<<<<< HEAD
 main.add_command(check)
 main.add_command(explain)
+main.add_command(limits)
 main.add_command(metamorphic)
 main.add_command(export)
 =======

@@ -14,6 +14,7 @@ from impactbench.reports import results
 
 SECTIONS: dict[str, tuple[str, str]] = {
     "hard": ("hard.html", "impactbench.reports.hard_view:view"),
+    "limits": ("limits.html", "impactbench.reports.limits_view:view"),
     "metamorphic": ("metamorphic.html", "impactbench.reports.metamorphic:view"),
 }
 """Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""
