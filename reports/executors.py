@@ -107,12 +107,14 @@ def cluster(address: str) -> Iterator[Executor]:
     """The workers of the dask.distributed scheduler at `address` as an executor. Raises ClusterError."""
     try:
         import distributed
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError:
         raise ClusterError("--scheduler needs dask.distributed: pip install 'impactbench[cluster]'") from None
     import logging
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # lost workers are ours to tell of
     try:
+        parse_host_port(parse_address(address)[1])  # a client made with a bad address complains for good
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as why:
         reason = " ".join(str(why).split()) or type(why).__name__

@@ -56,6 +56,10 @@ MISTAKES = [
     (["report", "nowhere"], "results.json"),
     (["compere"], "compare"),
     (["compare", "--stepp", "1/60"], "--step"),
+    (["compare", "--time-on-workers"], "--scheduler"),
+    (["compare", "--no-cache", "--rerun", "failed"], "--no-cache"),
+    (["export", "."], "--csv FILE"),
+    (["export", ".", "--csv", "table.csv"], "impactbench compare"),
 ]
 
 
