@@ -10,14 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-<<<<<<< HEAD
 from impactbench.reports.cli_check import check, explain
+from impactbench.reports.cli_hard import hard
 from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
 from impactbench.reports.cli_sweep import Sweep, export, sweep_options
-=======
-from impactbench.reports.cli_hard import hard
->>>>>>> 090ccbc (impactbench hard: survival of hard cases, resumable, with policies that mend what breaks)
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
 if TYPE_CHECKING:
@@ -288,16 +285,13 @@ def list_(what: str, pair_laws: bool) -> None:
         click.echo("\n" + terminal.pair_law_table(measured_laws()))
 
 
-<<<<<<< HEAD
 main.add_command(check)
 main.add_command(explain)
 main.add_command(limits)
 main.add_command(metamorphic)
 main.add_command(export)
-=======
 main.add_command(hard)
 
->>>>>>> 090ccbc (impactbench hard: survival of hard cases, resumable, with policies that mend what breaks)
 
 if __name__ == "__main__":
     main()

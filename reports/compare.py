@@ -165,22 +165,11 @@ def accuracy_lane(
     for cell, contestant in cells:
         if contestant.name in missing:
             outcomes[cell.key] = {"state": "unavailable", "reason": missing[contestant.name]}
-<<<<<<< HEAD
         elif cache and (stored := cache.get(cell, contestant)):
             outcomes[cell.key] = stored
         else:
             work[cell.key] = (cell, contestant)
     for done, outcome in enumerate(_run_cells(work.values(), jobs, progress, executor), 1):
-=======
-    work = [
-        Job(cell.key, contestant.lane, "impactbench.reports.cell:run_cell", (cell, contestant), CELL_LIMIT)
-        for cell, contestant in cells
-        if contestant.name not in missing
-    ]
-    if any(job.lane == "reference" for job in work):
-        compile_reference(progress)
-    for done, outcome in enumerate(run_jobs(work, jobs), 1):
->>>>>>> 090ccbc (impactbench hard: survival of hard cases, resumable, with policies that mend what breaks)
         outcomes[outcome.key] = _as_cell(outcome)
         if cache:
             cache.put(*work[outcome.key], outcomes[outcome.key])
@@ -188,7 +177,6 @@ def accuracy_lane(
     return outcomes
 
 
-<<<<<<< HEAD
 def _run_cells(
     cells: Iterable[Entry], jobs: int, progress: Progress, executor: Executor | None
 ) -> Generator[Outcome, None, None]:
@@ -199,15 +187,12 @@ def _run_cells(
     if executor:
         return executors.run_on(executor, work)
     if any(job.lane == "reference" for job in work):
-        _compile_reference(progress)
+        compile_reference(progress)
     return run_jobs(work, jobs)
 
 
-def _compile_reference(progress: Progress) -> None:
-=======
 def compile_reference(progress: Progress) -> None:
     """Compile the reference's kernels before any cell's clock runs: under a minute the first time, then stored."""
->>>>>>> 090ccbc (impactbench hard: survival of hard cases, resumable, with policies that mend what breaks)
     progress("compiling the reference (first run only)", 0, 1)
     for _ in run_jobs([executors.WARM_UP], 1):
         progress("compiling the reference (first run only)", 1, 1)

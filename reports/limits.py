@@ -105,9 +105,9 @@ def hunt(
             for value in each.search.wanted():
                 each.take(value, _lost("unavailable", why, 0.0))
     if any(each.contestant.lane == "reference" for each in hunts):
-        from impactbench.reports.compare import _compile_reference
+        from impactbench.reports.compare import compile_reference
 
-        _compile_reference(progress)
+        compile_reference(progress)
     turn = 0
     while work := [(each, value) for each in hunts for value in _wanted(each, effort)]:
         turn += 1

@@ -44,7 +44,7 @@ def metamorphic(
     progress: Progress = lambda *_: None,
 ) -> dict[str, Any]:
     """The section's part: a trial for every case and contestant, and the worst deviation of each relation."""
-    from impactbench.reports.compare import _compile_reference
+    from impactbench.reports.compare import compile_reference
 
     pairs = {f"{c.scene.name} {who.name}": (c, who) for who in contestants for c in cases}
     missing = {key: why for key, (_, who) in pairs.items() if (why := who.availability())}
@@ -60,7 +60,7 @@ def metamorphic(
         if key not in missing
     ]
     if any(job.lane == "reference" for job in work):
-        _compile_reference(progress)
+        compile_reference(progress)
     found: dict[str, dict[str, Any]] = {
         key: {"state": "unavailable", "reason": why, "rows": []} for key, why in missing.items()
     }
