@@ -25,6 +25,8 @@ from operator import attrgetter
 from typing import Any, Literal
 
 LONGEST_WAIT = 60.0  # [s] poll() takes no infinite timeout, a job's limit may be infinite
+MEMORY_LIMIT = 4 * 2**30
+"""[bytes] A healthy cell takes up to 0.3 GB with its engine, the largest scene that is measured 3 GB more."""
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 # Our search path goes first: without it the child may find another `impactbench`, or none.
 BOOT = """\
@@ -57,11 +59,15 @@ class Outcome:
     seconds: float  # in the call itself; from being sent, where the child could not tell
 
 
-def run_jobs(jobs: Sequence[Job], workers: int, memory_limit: int | None = None) -> Generator[Outcome, None, None]:
+def run_jobs(
+    jobs: Sequence[Job], workers: int, memory_limit: int | None = MEMORY_LIMIT
+) -> Generator[Outcome, None, None]:
     """Run each job in one of `workers` children; yield one outcome for each, as they finish.
 
-    `memory_limit` [bytes] bounds a child's address space. Leaving the loop early (`close`, an exception, Ctrl-C) kills
-    the children. Iterate in a thread that outlives the loop: on Linux children die with the thread that started them.
+    `memory_limit` [bytes] bounds what a child may write to (on Linux; reserved address space is not counted, as engines
+    reserve far more than they use): a job beyond it ends as error, MemoryError, or crashes in its engine's own code.
+    Leaving the loop early (`close`, an exception, Ctrl-C) kills the children. Iterate in a thread that outlives the
+    loop: on Linux children die with the thread that started them.
     """
     if workers < 1:
         raise ValueError(f"workers must be at least 1, not {workers}")
@@ -233,14 +239,14 @@ def serve(pipe: Connection[Any, Any], parent: int, memory_limit: int | None) -> 
         return
     os.set_inheritable(pipe.fileno(), False)  # what a job starts must not hold the pipe open
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash is an expected result, not one to debug from here
-    if memory_limit is not None:
-        resource.setrlimit(resource.RLIMIT_AS, (memory_limit, memory_limit))
+    if memory_limit is not None and sys.platform == "linux":
+        resource.setrlimit(resource.RLIMIT_DATA, (memory_limit, memory_limit))
     with suppress(EOFError):
         while True:
-            pipe.send_bytes(_answer(pipe.recv_bytes()))
+            pipe.send_bytes(_answer(pipe.recv_bytes(), memory_limit))
 
 
-def _answer(message: bytes) -> bytes:
+def _answer(message: bytes, memory_limit: int | None) -> bytes:
     started = time.perf_counter()
     try:
         call, argument = pickle.loads(message)
@@ -252,7 +258,10 @@ def _answer(message: bytes) -> bytes:
     except BaseException as fault:  # SystemExit too: a job must not end the child in silence
         seconds = time.perf_counter() - started
         fault.__traceback__ = None  # frees what the job held: after a MemoryError the answer needs some
-        return pickle.dumps(("error", None, _describe(fault), seconds))
+        reason = _describe(fault)
+        if memory_limit is not None and isinstance(fault, MemoryError):
+            reason = f"MemoryError: beyond the {memory_limit / 2**30:g} GiB that a job may take"
+        return pickle.dumps(("error", None, reason, seconds))
 
 
 def _describe(fault: BaseException) -> str:

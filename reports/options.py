@@ -31,6 +31,10 @@ class OneLineErrors(click.Group):
         except click.ClickException as error:
             click.echo(f"impactbench: {' '.join(error.format_message().split())}", err=True)
             sys.exit(2)
+        except OSError as error:  # a full disk under stdout, no process to be had: nothing of ours to debug
+            what = f"{error.filename}: " if error.filename else ""
+            click.echo(f"impactbench: {what}{error.strerror or error}", err=True)
+            sys.exit(2)
 
 
 def steps_of(_: click.Context, __: click.Parameter, texts: Sequence[str]) -> tuple[str, ...]:
@@ -67,11 +71,22 @@ def cases_of(names: Sequence[str]) -> list[Case]:
 
 
 def writable_folder(path: Path) -> Path:
+    """The folder, made if need be and ours until the command ends: another run would replace what this one writes."""
+    from filelock import FileLock, Timeout
+    from impactbench.reports import results
+
     try:
         path.mkdir(parents=True, exist_ok=True)
         probe = path / f".probe-{os.getpid()}"
         probe.touch()
         probe.unlink()
+        # The file stays: to remove it would let two runs hold one lock each. The system unlocks it when we die.
+        lock = FileLock(path / ".lock", timeout=0)
+        click.get_current_context().with_resource(lock)
+        results.remove_leftovers(path)
+    except Timeout:
+        message = f"another run is writing to {path}; wait for it or choose another folder with --out"
+        raise click.UsageError(message) from None
     except OSError as error:
         message = f"cannot write to {path}: {error.strerror}; choose another folder with --out"
         raise click.UsageError(message) from None

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from impactbench.reports.damage import damage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +42,13 @@ def write_bytes(path: Path, content: bytes) -> None:
         raise
 
 
+def remove_leftovers(folder: Path) -> None:
+    """Remove unfinished files that a killed run left here. Only for whoever holds the folder's lock."""
+    for path in folder.glob(".*.????????"):
+        if re.fullmatch(r"\..+\.(json|html|csv|parquet|md|xml)\.[a-z0-9_]{8}", path.name):
+            path.unlink(missing_ok=True)
+
+
 def save(document: dict[str, Any], path: Path) -> None:
     """Write the document as JSON. Numbers are finite by contract: NaN or infinity raises ValueError and leaves the
     old file alone.
@@ -49,11 +59,15 @@ def save(document: dict[str, Any], path: Path) -> None:
 def load_json(path: Path) -> Any:
     """What the JSON file at `path` holds. Raises ResultsError where it is missing or broken."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_number)
     except OSError as error:
         raise ResultsError(f"cannot read {path}: {error.strerror}; `impactbench compare` writes one") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ResultsError(f"{path} is not a results file: {error}") from None
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no JSON number")
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -64,6 +78,8 @@ def read(path: Path) -> dict[str, Any]:
         raise ResultsError(
             f"{path} has results schema {schema!r}, this version reads {SCHEMA}: run `impactbench compare` again"
         )
+    if wrong := damage(document):
+        raise ResultsError(f"{path} is damaged: {wrong}; run `impactbench compare` again")
     return dict(document)
 
 

@@ -191,7 +191,7 @@ def test_a_results_file_is_whole_or_the_old_one(tmp_path: Path) -> None:
     results.save({"schema": 1, "cells": [], "rows": []}, path)
     with pytest.raises(ValueError, match="Out of range"):
         results.save({"schema": 1, "cells": [], "rows": [{"value": float("nan")}]}, path)
-    assert results.read(path)["rows"] == []
+    assert results.load_json(path)["rows"] == []
     assert [file.name for file in tmp_path.iterdir()] == ["results.json"]
 
 
