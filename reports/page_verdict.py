@@ -8,7 +8,6 @@ import pandas as pd
 from impactbench.reports.page_data import (
     TARGET,
     counted,
-    expense,
     isolated,
     listing,
     number,
@@ -102,7 +101,7 @@ def _cheapest(view: View) -> str:
         return ""
     case = view.cases[view.featured]
     found = [(p, r) for p, line in view.of(view.featured).items() if (r := time_to(line, TARGET)) is not None]
-    found.sort(key=lambda item: expense(item[1]))
+    found.sort(key=lambda item: float(item[1]["cost"]))
     where = isolated(words(case["family"]))
     if not found:
         return f"Nobody stays below {view.goal(case)} in {where}."

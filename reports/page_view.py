@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from impactbench.reports import charts, charts_plain, page_failures, page_scores, page_verdict
+from impactbench.reports import charts, charts_plain, page_failures, page_scores, page_verdict, replay_view
 from impactbench.reports.page_data import TARGET, TARGETS, percent, tidy_cells, tidy_rungs
 from impactbench.reports.page_family import MAX_CHARTS, section
 
@@ -88,6 +88,7 @@ class View:
             "first": next((s for s in sections if s["case"]["name"] == self.featured), None),
             "sections": sections,
             "cards": page_failures.cards(self),
+            "replay": self.replay(),
             "scoreboard": scores,
             "ladders": [[cell["ladder"] for cell in row["cells"]] for row in scores],
             "policies": self.policies,
@@ -101,6 +102,12 @@ class View:
             .fillna("")
             .to_dict("records"),
         }
+
+    def replay(self) -> dict[str, Any] | None:
+        """What the replay's part of the page shows, if anything was recorded."""
+        found = replay_view.view(self.document, self.style, self.featured)
+        self.thinned += found["notes"] if found else []
+        return found
 
     def stacked_or_first(self) -> str | None:
         """A stacked drop, else the first case; among the timed ones if anything was timed."""

@@ -23,6 +23,8 @@ MOST_WORDS = 1_000_000
 """Bodies, times frames, times coordinates of one run: 2 MB before compression."""
 FARTHEST = 30
 """Lengths of the scene: a run that flies off is drawn no farther, else its box would blur what happened before."""
+VISIBLE = 0.06
+"""Of the picture's diagonal: some 12 pixels of a panel's 200."""
 Recording = dict[str, Any]
 
 
@@ -42,6 +44,7 @@ def packed_case(case: Case, runs: list[Recording], silent: list[dict[str, str]],
     truths = {law: truth_track(scene, law, case.truths[law], frame, count) for law in laws}
     healthy = [run["positions"] for run in runs if run["state"] == "ok"]
     known = [track.pop("places") for track in truths.values()]
+    box = camera(scene, healthy, known)
     return {
         "case": scene.name,
         "step_text": cell.step,
@@ -51,7 +54,8 @@ def packed_case(case: Case, runs: list[Recording], silent: list[dict[str, str]],
         "length": scene.length,
         "axes": list(scene.model.axes),
         "picture": list(picture_axes(scene)),
-        "camera": camera(scene, healthy, known),
+        "camera": box,
+        "apart": apart(runs, frame / thin, float(np.linalg.norm(np.subtract(box["high"], box["low"])))),
         "bodies": [drawn(body) for body in scene.bodies],
         "movable": list(scene.movable),
         "truths": truths,
@@ -88,6 +92,33 @@ def camera(scene: Scene, runs: list[Floats], truths: list[Floats]) -> dict[str, 
     low, high = np.maximum(low, sure.min(axis=0) - reach), np.minimum(high, sure.max(axis=0) + reach)
     margin = max(_extent(scene.bodies[i]) for i in scene.movable)
     return {"low": rounded(low - margin), "high": rounded(high + margin)}
+
+
+def apart(runs: list[Recording], frame: float, picture: float) -> dict[str, Any] | None:
+    """When two runs of one law first differ by what the eye sees, else when they differ most; `picture` is its
+    diagonal [m]. None without two such runs. Runs of different laws differ rightly.
+    """
+    best: dict[str, Any] | None = None
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if run["cell"].law != other["cell"].law:
+                continue
+            count = min(len(run["positions"]), len(other["positions"]))
+            away = np.linalg.norm(run["positions"][:count] - other["positions"][:count], axis=2).max(axis=1)
+            seen = bool(away.max() > VISIBLE * picture)
+            at = int(np.argmax(away > VISIBLE * picture)) if seen else int(away.argmax())
+            names = [other["cell"].contestant, run["cell"].contestant]
+            found = {"time": at * frame, "distance": float(away[at]), "visible": seen, "runs": names}
+            if best is None or _sooner(found, best):
+                best = found
+    return best
+
+
+def _sooner(found: dict[str, Any], best: dict[str, Any]) -> bool:
+    """Whether a pair comes apart before another; one that is seen to counts before one that is not."""
+    if found["visible"] != best["visible"]:
+        return bool(found["visible"])
+    return bool(found["time"] < best["time"] if found["visible"] else found["distance"] > best["distance"])
 
 
 def _extent(body: Body) -> float:
