@@ -14,6 +14,7 @@ from impactbench.reports.cli_check import check, explain
 from impactbench.reports.cli_hard import hard
 from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
+from impactbench.reports.cli_predictability import predictability
 from impactbench.reports.cli_sweep import Sweep, export, sweep_options
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
@@ -289,6 +290,7 @@ main.add_command(check)
 main.add_command(explain)
 main.add_command(limits)
 main.add_command(metamorphic)
+main.add_command(predictability)
 main.add_command(export)
 main.add_command(hard)
 

@@ -33,11 +33,11 @@ class Effort:
 
     sweep: int = 9
     precision: float = 0.05
-    budget: float = 60.0
-    limit: float = 30.0
+    budget: float = 120.0
+    limit: float = 60.0
 
 
-QUICK, FULL = Effort(), Effort(17, 0.01, 600.0, 120.0)
+QUICK, FULL = Effort(), Effort(17, 0.01, 900.0, 300.0)
 
 
 @dataclass
@@ -253,7 +253,7 @@ def _result(each: Hunt) -> dict[str, Any]:
         "state": why["state"] if why else "survived",
         "reason": why["reason"] if why else "",
         "time_to_failure": why["time"] if why else None,
-        "stopped": bool(search.wanted()),
+        "stopped": bool(search.wanted()) or any(probe["state"] == "timed out" for probe in probes.values()),
         "seconds": each.spent,
         "probes": [{"value": value, **probes[value]} for value in search.range.by_severity(list(probes))],
     }

@@ -7,7 +7,7 @@ from typing import Any
 NOTE = """\
 The value up to which every run satisfies its truth; the next that was tried, within {precision:.0%} (whole numbers: one
 more), does not. >=: the whole range survives. <: the mildest value does not. ~: not monotone, values beyond survive
-again. *: stopped, the bracket is wider. -: unsupported. With a truth, nearer to it is better, else further is."""
+again. *: runs took too long, the bracket is wider. -: unsupported. With a truth, nearer to it is better."""
 
 
 def text(part: dict[str, Any]) -> str:

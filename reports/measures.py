@@ -53,7 +53,7 @@ def measure(case: Case, law: Law, trajectory: Trajectory, delay: float = 0.0) ->
 
 
 def _against_truth(scene: Scene, truth: Truth, trajectory: Trajectory, delay: float) -> Iterator[Figure]:
-    last = len(trajectory.times) - 1
+    last = int(np.searchsorted(trajectory.times - delay, truth.horizon, "right")) - 1
     end = truth.state(float(trajectory.times[last]) - delay)
     if end is not None:
         yield Figure("position_error", _distance(trajectory.positions[last], end) / scene.length)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from impactbench.adapters.contestants import Contestant
+from impactbench.reports.sources import fingerprint
 
 
 class ProbeStore:
@@ -45,24 +45,5 @@ class ProbeStore:
 
 def key_of(contestant: Contestant, *parts: object) -> str:
     """A digest of everything that decides a probe's outcome."""
-    words = [contestant.name, contestant.factory, str(contestant.version()), sources(), _own(contestant), *parts]
+    words = [contestant.name, fingerprint(contestant), *parts]
     return hashlib.sha256("\n".join(map(repr, words)).encode()).hexdigest()[:32]
-
-
-def _own(contestant: Contestant) -> str:
-    path = contestant.factory.rpartition(":")[0]
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path.endswith(".py") else ""
-
-
-@cache
-def sources() -> str:
-    """A digest of the scenarios, the reference and the adapters as they are on disk."""
-    import impactbench.adapters
-    import impactbench.reference
-    import impactbench.scenarios
-
-    digest = hashlib.sha256()
-    for package in (impactbench.scenarios, impactbench.adapters, impactbench.reference):
-        for path in sorted(Path(next(iter(package.__path__))).glob("*.py")):
-            digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()

@@ -16,6 +16,7 @@ SECTIONS: dict[str, tuple[str, str]] = {
     "hard": ("hard.html", "impactbench.reports.hard_view:view"),
     "limits": ("limits.html", "impactbench.reports.limits_view:view"),
     "metamorphic": ("metamorphic.html", "impactbench.reports.metamorphic:view"),
+    "predictability": ("predictability.html", "impactbench.reports.predictability_view:view"),
 }
 """Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""
 

@@ -9,13 +9,15 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from impactbench.scenarios import hard_fast, hard_stacks
+from impactbench.scenarios import hard_chaos, hard_fast, hard_stacks
 from impactbench.scenarios.naming import Parameters, case_name
 from impactbench.scenarios.records import Scene
 from impactbench.scenarios.survival import Criterion, HardFamily
 from impactbench.scenarios.truth import Case
 
-HARD: dict[str, HardFamily] = {family.name: family for family in (*hard_stacks.FAMILIES, *hard_fast.FAMILIES)}
+HARD: dict[str, HardFamily] = {
+    family.name: family for family in (*hard_stacks.FAMILIES, *hard_fast.FAMILIES, *hard_chaos.FAMILIES)
+}
 
 
 def criteria_of(scene: Scene) -> tuple[Criterion, ...]:

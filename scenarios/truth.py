@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -20,11 +21,14 @@ class Truth:
     conservation only).
     state:        time [s] -> the movable bodies' state, or None at times where nothing is known.
     impact_times: instants [s] of the impacts, ascending, as far as known; may be empty.
+    horizon:      time [s] until which the state is known in spite of round-off: finite where the motion is chaotic
+    (see reports/predictability.py). Errors are taken up to it.
     """
 
     kind: Kind
     state: Callable[[float], State | None]
     impact_times: tuple[float, ...] = ()
+    horizon: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)

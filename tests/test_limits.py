@@ -25,6 +25,7 @@ from impactbench.reports.limits import QUICK, families, hunt
 from impactbench.reports.limits_view import text, view
 from impactbench.reports.page import environment
 from impactbench.reports.probe_store import ProbeStore, key_of
+from impactbench.reports.sources import fingerprint
 
 FAKES = Path(__file__).parent / "fakes" / "limits.py"
 LIMIT = 1234.5
@@ -188,6 +189,7 @@ def test_a_kept_run_counts_only_for_what_made_it(tmp_path: Path) -> None:
     first = key_of(contestant, "scene")
     assert first == key_of(contestant, "scene") != key_of(contestant, "other scene")
     mine.write_text("# two\n")
+    fingerprint.cache_clear()
     assert key_of(contestant, "scene") != first
 
 
