@@ -1,13 +1,14 @@
 """Budgets that differ from the derived ones, as entries of a TOML file: an engine's known limits, a project's own.
 
     [[budget]]
-    check = "rest-heights"      # a check's name or a glob
-    engine = "pymunk/default"   # engine, contestant or glob; default: all
-    case = "stacked_drop*"      # family, case or glob (brackets stand for themselves); default: all
+    check = "rest-heights"      # a check's name or a glob, or a list of such
+    engine = "pymunk/default"   # engine, contestant or glob, or a list; default: all
+    case = "stacked_drop*"      # family, case or glob (brackets stand for themselves), or a list; default: all
     limit = 2e-3                # instead of the derived budget, in the check's own unit; or
+    at_least = 2e-3             # the derived budget, but never less than this; or
     factor = 3.0                # times the derived budget; or
     off = true                  # this check says nothing here
-    step = "1/240"              # limit holds at this step and grows as (h/step)^order; default: at every step
+    step = "1/240"              # limit or at_least hold here and grow as (h/step)^order; default: at every step
     order = 1
     reason = "slop 1e-3 is left alone"
 
@@ -29,7 +30,7 @@ from impactbench.reports.budget_formulas import Setting
 from impactbench.reports.budgets import CHECKS, Check
 from impactbench.reports.cell import step_seconds
 
-KEYS = ("check", "engine", "case", "limit", "factor", "off", "step", "order", "reason")
+KEYS = ("check", "engine", "case", "limit", "at_least", "factor", "off", "step", "order", "reason")
 KNOWN_LIMITS = Path(__file__).with_name("known_limits.toml")
 
 
@@ -39,13 +40,14 @@ class BudgetError(ValueError):
 
 @dataclass(frozen=True)
 class Override:
-    """One entry: where it applies and what it allows. Exactly one of `limit`, `factor` and `off` is set."""
+    """One entry: where it applies and what it allows. Exactly one of `limit`, `at_least`, `factor` and `off` is set."""
 
-    check: str
-    engine: str
-    case: str
+    check: tuple[str, ...]
+    engine: tuple[str, ...]
+    case: tuple[str, ...]
     reason: str
     limit: float | None = None
+    at_least: float | None = None
     factor: float | None = None
     off: bool = False
     step: float | None = None
@@ -53,15 +55,20 @@ class Override:
     source: str = ""
 
     def matches(self, check: Check, contestant: str, case: str) -> bool:
-        engine = contestant if "/" in self.engine else contestant.partition("/")[0]
-        named = _glob(self.case, case) or _glob(self.case, case.partition("[")[0])
-        return _glob(self.check, check.name) and _glob(self.engine, engine) and named
+        return (
+            _any(self.check, check.name)
+            and _any(self.engine, contestant, contestant.partition("/")[0])
+            and _any(self.case, case, case.partition("[")[0])
+        )
 
     def budget(self, check: Check, setting: Setting) -> float:
         if self.factor is not None:
             return self.factor * check.budget(setting)
+        scale = (setting.step / self.step) ** self.order if self.step else 1.0
+        if self.at_least is not None:
+            return max(self.at_least * scale, check.budget(setting))
         assert self.limit is not None
-        return self.limit * ((setting.step / self.step) ** self.order if self.step else 1.0)
+        return self.limit * scale
 
 
 Overrides = Sequence[Override]
@@ -111,31 +118,42 @@ def _entry(entry: dict[str, Any], where: str) -> Override:
     unknown = [key for key in entry if key not in KEYS]
     if unknown:
         raise BudgetError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(KEYS)}")
-    texts = {key: _text(entry, key, where) for key in ("check", "engine", "case", "reason")}
-    if not any(_glob(texts["check"], check.name) for check in CHECKS):
-        names = ", ".join(check.name for check in CHECKS)
-        raise BudgetError(f"{where}: no check is named {texts['check']!r}; known: {names}")
-    if not texts["reason"]:
+    places = {key: _texts(entry, key, where) for key in ("check", "engine", "case")}
+    for text in places["check"]:
+        if not any(_any((text,), check.name) for check in CHECKS):
+            names = ", ".join(check.name for check in CHECKS)
+            raise BudgetError(f"{where}: no check is named {text!r}; known: {names}")
+    reason = entry.get("reason")
+    if not isinstance(reason, str) or not reason.strip():
         raise BudgetError(f"{where}: a reason is missing")
-    chosen = [key for key in ("limit", "factor", "off") if entry.get(key) not in (None, False)]
+    chosen = [key for key in ("limit", "at_least", "factor", "off") if entry.get(key) not in (None, False)]
     if len(chosen) != 1:
-        raise BudgetError(f"{where}: give one of limit, factor and off = true, not {', '.join(chosen) or 'none'}")
-    numbers = {key: _number(entry, key, where) for key in ("limit", "factor", "order")}
+        raise BudgetError(
+            f"{where}: give one of limit, at_least, factor and off = true, not {', '.join(chosen) or 'none'}"
+        )
+    numbers = {key: _number(entry, key, where) for key in ("limit", "at_least", "factor", "order")}
     step = _step(entry, where)
     if numbers["order"] is not None and step is None:
-        raise BudgetError(f"{where}: order needs the step at which limit holds")
+        raise BudgetError(f"{where}: order needs the step at which the number holds")
     return Override(
-        texts["check"], texts["engine"], texts["case"], texts["reason"],
-        limit=numbers["limit"], factor=numbers["factor"], off=entry.get("off") is True,
-        step=step, order=numbers["order"] or 0.0, source=where,
-    )  # fmt: skip
+        **places,
+        reason=" ".join(reason.split()),
+        limit=numbers["limit"],
+        at_least=numbers["at_least"],
+        factor=numbers["factor"],
+        off=entry.get("off") is True,
+        step=step,
+        order=numbers["order"] or 0.0,
+        source=where,
+    )
 
 
-def _text(entry: dict[str, Any], key: str, where: str) -> str:
-    value = entry.get(key, "" if key == "reason" else "*")
-    if not isinstance(value, str):
-        raise BudgetError(f"{where}: {key} is a text, not {value!r}")
-    return value
+def _texts(entry: dict[str, Any], key: str, where: str) -> tuple[str, ...]:
+    value = entry.get(key, "*")
+    values = value if isinstance(value, list) else [value]
+    if not values or not all(isinstance(text, str) and text for text in values):
+        raise BudgetError(f"{where}: {key} is a text or a list of texts, not {value!r}")
+    return tuple(values)
 
 
 def _number(entry: dict[str, Any], key: str, where: str) -> float | None:
@@ -156,5 +174,7 @@ def _step(entry: dict[str, Any], where: str) -> float | None:
         raise BudgetError(f"{where}: {error}") from None
 
 
-def _glob(pattern: str, name: str) -> bool:
-    return re.fullmatch(re.escape(pattern).replace(r"\*", ".*").replace(r"\?", "."), name) is not None
+def _any(patterns: tuple[str, ...], *names: str) -> bool:
+    """Whether one of the patterns, with * and ?, is one of the names."""
+    matchers = [re.escape(pattern).replace(r"\*", ".*").replace(r"\?", ".") for pattern in patterns]
+    return any(re.fullmatch(matcher, name) for matcher in matchers for name in names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,22 +67,21 @@ def weight_late(s: Setting) -> float:
 
 
 def energy_gain(s: Setting) -> float:
-    return s.round_off() + turning(s) + weight_late(s) / s.scene.energy
+    lifted = sunk(s) if s.scene.model.rotation else 0.0
+    return s.round_off() + turning(s) + (weight_late(s) + lifted) / s.scene.energy
+
+
+def energy_excess(s: Setting) -> float:
+    return energy_gain(s) + s.step * s.scales.lossy / s.scene.energy
 
 
 def energy_loss(s: Setting) -> float:
-    scene, scales = s.scene, s.scales
-    contacts = [scene.contact, *(contact for _, _, contact in scene.pairs)]
-    lossy = max(1 - c.bounciness**2 for c in contacts)
-    reach = smallest_size(scene)
-    turned = lossy * scales.sheared * scales.fastest * s.step / reach if reach else 0.0
-    return energy_gain(s) + turned / scene.energy
+    return s.round_off() + turning(s) + (weight_late(s) + sunk(s)) / s.scene.energy
 
 
-def smallest_size(scene: Scene) -> float:
-    """Smallest sum of radii of two movable balls [m]: what a normal turns about."""
-    radii = sorted(getattr(scene.bodies[i].shape, "radius", math.inf) for i in scene.movable)
-    return sum(radii[:2]) if len(radii) > 1 and math.isfinite(sum(radii[:2])) else 0.0
+def sunk(s: Setting) -> float:
+    """Energy [J] of weights that rest one step of falling too low, M g N g h^2."""
+    return s.scales.weight * len(s.scene.movable) * fallen(s) if s.scales.lasting else 0.0
 
 
 def fallen(s: Setting) -> float:
@@ -105,13 +103,13 @@ def impact(s: Setting) -> float:
 
 
 def impact_time(s: Setting) -> float:
-    return s.step * (1 + MARGIN * s.steps * EPSILON)
+    return s.step * ((1.5 if any(s.scene.gravity) else 1.0) + MARGIN * s.steps * EPSILON)
 
 
 def position(s: Setting) -> float:
     scales, scene = s.scales, s.scene
     flight = float(np.linalg.norm(scene.gravity)) * s.step * scene.duration / 2
-    return (flight + scales.jumps * s.step) / scene.length + s.round_off()
+    return (flight + (scales.jumps + scales.turned) * s.step) / scene.length + s.round_off()
 
 
 def friction(s: Setting) -> float:

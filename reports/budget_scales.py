@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from impactbench.reports.impacts import PairHistory, pair_histories
-from impactbench.scenarios.records import Law, Scene
+from impactbench.scenarios.records import Law, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case, Truth
 
@@ -32,6 +32,9 @@ class Scales:
     weight:   sum of m |g| [N].
     falling:  largest speed along gravity at an impact [m/s].
     power:    largest |sum of m g . v| at any time [W].
+    turned:   sum over the impacts of movable balls of the velocity [m/s] that a normal found late changes, per second
+              late, times the seconds that are left: (1 + e) mu_r/m |u| |u_t| (T - t)/(R_A + R_B) [m/s].
+    lossy:    sum over the same of the energy that it changes, (1 - e^2) mu_r |u_n| u_t^2/(R_A + R_B) [J/s].
     lasting:  bodies touch at the start, or end at rest upon one another: contact lasts.
     """
 
@@ -44,45 +47,69 @@ class Scales:
     weight: float
     falling: float
     power: float
+    turned: float
+    lossy: float
     lasting: bool
 
 
 @cache
 def scales_of(case: Case, law: Law) -> Scales:
-    scene, truth = case.scene, case.truths[law]
-    mass = np.array([scene.bodies[i].mass for i in scene.movable], dtype=float)
-    gravity = np.array(scene.gravity)
-    weight = float(mass.sum() * np.linalg.norm(gravity))
-    start = _opening(scene)
-    lasting = not scene.phase_free or truth.kind == "end state"
-    known = truth.kind == "trajectory"
-    hits = [t for t in truth.impact_times if 0 < t < scene.duration] if known else []
-    tiny = JUST_BEFORE * scene.duration
-    before = [state for t in hits if (state := truth.state(max(t - tiny, 0.0))) is not None]
-    after = [state for t in hits if (state := truth.state(t + tiny)) is not None]
-    samples = [start, *before, *after, *(_sampled(truth, scene.duration) if known else [])]
-    speeds = np.array([state.velocities for state in samples])
-    closing, sheared = _approaches(scene, before)
-    if not known:  # an end state, an invariant or a scene file: nothing but the scene's own scales
-        closing, sheared = scene.speed, _reduced(mass) * scene.speed**2 / 2
-    downward = gravity / np.linalg.norm(gravity) if weight else gravity
-    jumped = [
-        float(np.linalg.norm(b.velocities - a.velocities, axis=1).max()) for a, b in zip(before, after, strict=True)
-    ]
-    falls = [float(np.abs(state.velocities @ downward).max()) for state in before]
-    power = float(np.abs(np.einsum("n,tni,i->t", mass, speeds, gravity)).max())
+    truth = case.truths[law]
+    return _from_truth(case.scene, truth) if truth.kind == "trajectory" else _from_scene(case.scene, truth)
+
+
+def _from_scene(scene: Scene, truth: Truth) -> Scales:
+    """An end state, an invariant or a scene file: nothing is known but the scene's own scales."""
+    mass, weight = _masses(scene), _weight(scene)
     return Scales(
-        impacts=len(hits),
-        closing=closing,
-        jumps=sum(jumped) if known else 2 * scene.speed,
-        fastest=float(np.linalg.norm(speeds, axis=2).max()) if known else scene.speed,
-        sheared=sheared,
+        impacts=0,
+        closing=scene.speed,
+        jumps=2 * scene.speed,
+        fastest=scene.speed,
+        sheared=_reduced(mass) * scene.speed**2 / 2 if scene.model.dimension > 1 else 0.0,
+        angular=_angular(mass, _opening(scene)),
+        weight=weight,
+        falling=scene.speed if weight else 0.0,
+        power=weight * scene.speed,
+        turned=0.0,
+        lossy=0.0,
+        lasting=not scene.phase_free or truth.kind == "end state",
+    )
+
+
+def _from_truth(scene: Scene, truth: Truth) -> Scales:
+    mass, weight, gravity = _masses(scene), _weight(scene), np.array(scene.gravity)
+    start, tiny = _opening(scene), JUST_BEFORE * scene.duration
+    times = [t for t in truth.impact_times if 0 < t < scene.duration]
+    before = _known(truth, [max(t - tiny, 0.0) for t in times])
+    after = _known(truth, [t + tiny for t in times])
+    samples = [start, *before, *after, *_known(truth, np.linspace(0.0, scene.duration, SAMPLES + 1).tolist())]
+    speeds = np.array([state.velocities for state in samples])
+    jumped = [np.linalg.norm(b.velocities - a.velocities, axis=1).max() for a, b in zip(before, after, strict=True)]
+    falls = [np.abs(state.velocities @ gravity).max() * mass.sum() / weight for state in before] if weight else []
+    meetings = _meetings(scene, before, times)
+    return Scales(
+        impacts=len(times),
+        closing=max((m.closing for m in meetings), default=0.0),
+        jumps=float(sum(jumped)),
+        fastest=float(np.linalg.norm(speeds, axis=2).max()),
+        sheared=max((m.reduced * m.closing * m.across for m in meetings), default=0.0),
         angular=_angular(mass, start),
         weight=weight,
-        falling=max(falls, default=0.0) if known else scene.speed,
-        power=power if known else weight * scene.speed,
-        lasting=lasting,
+        falling=float(max(falls, default=0.0)),
+        power=float(np.abs(np.einsum("n,tni,i->t", mass, speeds, gravity)).max()),
+        turned=sum(m.turned for m in meetings),
+        lossy=sum(m.lossy for m in meetings),
+        lasting=not scene.phase_free,
     )
+
+
+def _masses(scene: Scene) -> Floats:
+    return np.array([scene.bodies[i].mass for i in scene.movable], dtype=float)
+
+
+def _weight(scene: Scene) -> float:
+    return float(_masses(scene).sum() * np.linalg.norm(scene.gravity))
 
 
 def _opening(scene: Scene) -> State:
@@ -90,28 +117,49 @@ def _opening(scene: Scene) -> State:
     return State(np.array([b.position for b in bodies], float), np.array([b.velocity for b in bodies], float))
 
 
-def _sampled(truth: Truth, duration: float) -> list[State]:
-    states = (truth.state(float(t)) for t in np.linspace(0.0, duration, SAMPLES + 1))
-    return [state for state in states if state is not None]
+def _known(truth: Truth, times: Sequence[float]) -> list[State]:
+    return [state for t in times if (state := truth.state(t)) is not None]
 
 
-def _approaches(scene: Scene, before: list[State]) -> tuple[float, float]:
-    """Fastest |u_n| [m/s] and largest mu_r |u_n| |u_t| [kg m^2/s^2] of the pairs in contact at the impacts."""
+@dataclass(frozen=True)
+class Meeting:
+    """One pair at one impact: |u_n| and |u_t| [m/s], mu_r [kg] (0 with a static) and what a late normal changes."""
+
+    closing: float
+    across: float
+    reduced: float
+    turned: float
+    lossy: float
+
+
+def _meetings(scene: Scene, before: list[State], times: Sequence[float]) -> list[Meeting]:
     if not before:
-        return 0.0, 0.0
+        return []
     pairs = pair_histories(scene, _stacked(before))
-    found = [_approach(scene, pair) for pair in pairs]
-    return max((u for u, _ in found), default=0.0), max((s for _, s in found), default=0.0)
+    return [
+        meeting
+        for pair in pairs
+        for k, time in enumerate(times)
+        if (meeting := _meeting(scene, pair, k, scene.duration - time))
+    ]
 
 
-def _approach(scene: Scene, pair: PairHistory) -> tuple[float, float]:
-    along = np.einsum("ti,ti->t", pair.relative, pair.normal)
-    across = np.linalg.norm(pair.relative - along[:, None] * pair.normal, axis=1)
-    meets = (pair.gap <= TOUCHING * scene.length + 2 * JUST_BEFORE * scene.duration * np.abs(along)) & (along < 0)
-    masses = [scene.bodies[i].mass for i in (pair.a, pair.b)]
-    reduced = 0.0 if None in masses else 1 / sum(1 / (m or math.inf) for m in masses)
-    closing = np.where(meets, -along, 0.0)
-    return float(closing.max()), float((reduced * closing * across).max())
+def _meeting(scene: Scene, pair: PairHistory, k: int, left: float) -> Meeting | None:
+    along = float(pair.relative[k] @ pair.normal[k])
+    reach = TOUCHING * scene.length + 2 * JUST_BEFORE * scene.duration * abs(along)
+    if along >= 0 or pair.gap[k] > reach:
+        return None
+    a, b = scene.bodies[pair.a], scene.bodies[pair.b]
+    across = float(np.linalg.norm(pair.relative[k] - along * pair.normal[k]))
+    if a.mass is None or b.mass is None:
+        return Meeting(-along, across, 0.0, 0.0, 0.0)
+    reduced = a.mass * b.mass / (a.mass + b.mass)
+    radii = [body.shape.radius for body in (a, b) if isinstance(body.shape, Sphere)]
+    rate = across / sum(radii) if len(radii) == 2 else 0.0  # rad/s: a line of centres turns, a face's normal does not
+    e = scene.contact_of(pair.a, pair.b).bounciness
+    speed = float(np.linalg.norm(pair.relative[k]))
+    turned = (1 + e) * reduced / min(a.mass, b.mass) * speed * rate * left
+    return Meeting(-along, across, reduced, turned, (1 - e**2) * reduced * -along * across * rate)
 
 
 def _stacked(states: list[State]) -> Trajectory:

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -100,7 +101,8 @@ def _judge(
     entry = overriding(overrides, check, blank.contestant, case.scene.name)
     if excused or (entry and entry.off):
         return replace(blank, status="excused", reason=excused or (entry.reason if entry else ""))
-    budget = entry.budget(check, setting) if entry else check.budget(setting)
+    derived = check.budget(setting)
+    budget = entry.budget(check, setting) if entry else derived
     blank = replace(blank, budget=budget, limit=f"{entry.source}: {entry.reason}" if entry else "")
     if check.measure not in figures:
         return _absent(check, setting, blank)
@@ -108,15 +110,26 @@ def _judge(
     counted = check.excess(value) if math.isfinite(value) else math.nan
     if not math.isfinite(counted):
         return replace(blank, status="failed", reason=f"{check.measure} is not a finite number")
+    if counted <= derived <= budget:  # the entry was not needed
+        return replace(blank, value=counted, budget=derived, limit="")
     if counted <= budget:
         return replace(blank, value=counted)
     return replace(blank, status="failed", value=counted, reason=f"{check.measure} {value:.3g} exceeds {budget:.3g}")
 
 
+APART = 3
+"""Steps between an impact and the next from which on a contestant must show it as one of its own."""
+
+
 def _absent(check: Check, setting: Setting, blank: Verdict) -> Verdict:
-    """A figure that is not there: a failure where a run of the truth itself has it, so that a missed impact shows."""
-    if check.measure in _of_truth(setting.case, setting.law, setting.step):
-        return replace(blank, status="failed", reason=f"the truth has a {check.measure}, this run has none: no impact")
+    """A figure that is not there: a failure where a run of the truth itself has it and its impacts are apart in time,
+    so that a missed impact shows.
+    """
+    case, law, step = setting.case, setting.law, setting.step
+    times = [0.0, *(t for t in case.truths[law].impact_times if t < case.scene.duration)]
+    apart = all(later - sooner > APART * step for sooner, later in pairwise(times))
+    if apart and check.measure in _of_truth(case, law, step):
+        return replace(blank, status="failed", reason=f"no {check.measure}: the truth has an impact, this run none")
     return replace(blank, status="excused", reason=f"no {check.measure}: contacts are not apart in time")
 
 
