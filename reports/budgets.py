@@ -125,8 +125,8 @@ CHECKS: tuple[Check, ...] = (
         formulas.energy_loss,
         excuses.always,
         "100 n eps + h (M g v_g + [contact lasts] (|P_g|/2 + M g N g h)) / E + h T w^2/2 (free rotation)",
-        "As for the gain. Besides, a body that rests one step of falling too low has lost m g g h^2, in a column of N up "
-        "to N times that each.",
+        "As for the gain. Besides, a body that rests one step of falling too low has lost m g g h^2; in a column of N "
+        "up to N times that each.",
     ),
     Check(
         "penetration",

@@ -27,7 +27,8 @@ MOST_GAPS = 50_000_000
 @dataclass(frozen=True)
 class Cell:
     """What identifies a cell. `step` is text such as 1/240, so that it names the same number everywhere; `phase` is
-    in steps. `scene` is what a scene file said; a child knows the catalogue's cases by name.
+    in steps. `scene` is what a scene file said; a child knows the catalogue's cases by name. `until` [s] ends the run
+    earlier than its scene does.
     """
 
     case: str
@@ -37,6 +38,7 @@ class Cell:
     step: str
     phase: float = 0.0
     scene: Scene | None = None
+    until: float = math.inf
 
     @property
     def step_seconds(self) -> float:
@@ -45,6 +47,12 @@ class Cell:
     @property
     def key(self) -> str:
         return f"{self.case} {self.law} {self.contestant} {self.model} {self.step} {self.phase:g}"
+
+    @property
+    def steps(self) -> int:
+        """How many steps are run."""
+        count = step_count(case_of(self).scene, self.step_seconds)
+        return min(count, max(1, round(self.until / self.step_seconds))) if math.isfinite(self.until) else count
 
 
 def step_seconds(text: str) -> float:
@@ -99,7 +107,7 @@ def run_cell(argument: tuple[Cell, Contestant]) -> dict[str, Any]:
         return {"state": "unavailable", "reason": str(why)}
     try:
         case = case_of(cell)
-        trajectory = record(engine, cell.step_seconds, step_count(case.scene, cell.step_seconds))
+        trajectory = record(engine, cell.step_seconds, cell.steps)
         settings = {name: plain(value) for name, value in engine.settings.items()}
     except Unsupported as why:  # an engine may find out only on the way, as when impacts accumulate
         return {"state": "unsupported", "reason": str(why)}

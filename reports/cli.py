@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from impactbench.reports.cli_check import check, explain
+from impactbench.reports.cli_check import baseline, check, explain
 from impactbench.reports.cli_hard import hard
 from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
@@ -286,6 +286,7 @@ def list_(what: str, pair_laws: bool) -> None:
         click.echo("\n" + terminal.pair_law_table(measured_laws()))
 
 
+main.add_command(baseline)
 main.add_command(check)
 main.add_command(explain)
 main.add_command(limits)

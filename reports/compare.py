@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import time
@@ -47,7 +48,7 @@ class Plan:
     """What to run. `law` is for the contestants that can choose theirs.
 
     Cases that are timed run at every one of `phases` [steps], so that no lucky step earns a rung; others at the first.
-    `replay`: record one case of each family for the report's replay.
+    `replay`: record one case of each family for the report's replay. `until` [s] ends runs early.
     """
 
     cases: Sequence[Case]
@@ -59,6 +60,7 @@ class Plan:
     jobs: int = 1
     timing: str = "some"
     replay: bool = False
+    until: float = math.inf
 
     def timed(self) -> set[str]:
         """Names of the cases to time. `some`: those of `TIMED`, and one of each family where few are asked for."""
@@ -80,7 +82,10 @@ class Plan:
         """In an order that keeps an engine's cells together."""
         timed = self.timed()
         return [
-            (cell_of(case, law_of(contestant, case, self.law), contestant.name, model, step, phase), contestant)
+            (
+                cell_of(case, law_of(contestant, case, self.law), contestant.name, model, step, phase, self.until),
+                contestant,
+            )
             for contestant in self.contestants
             for case in self.cases
             for model in self.models
@@ -89,10 +94,12 @@ class Plan:
         ]
 
 
-def cell_of(case: Case, law: Law, contestant: str, model: str, step: str, phase: float) -> Cell:
+def cell_of(
+    case: Case, law: Law, contestant: str, model: str, step: str, phase: float, until: float = math.inf
+) -> Cell:
     """A child gets the scene itself where its catalogue does not hold it: the file is read once."""
     scene = case.scene if case.from_file else None
-    return Cell(case.scene.name, law, contestant, model, step, phase, scene)
+    return Cell(case.scene.name, law, contestant, model, step, phase, scene, until)
 
 
 def law_of(contestant: Contestant, case: Case, asked: Law | None) -> Law:

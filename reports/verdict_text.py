@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from impactbench.reports.terminal import table
-from impactbench.reports.verdicts import Verdict, counts
+from impactbench.reports.verdicts import BASELINE, Verdict, counts
+
+if TYPE_CHECKING:
+    from impactbench.reports.gate import Finding
 
 MOST_LINES = 40
 """Failures listed in full; the rest are counted."""
@@ -22,22 +25,32 @@ def figure(value: float, unit: str) -> str:
 def line(verdict: Verdict) -> str:
     """One verdict in one line."""
     head = f"{verdict.status.upper()} {verdict.check}: {verdict.where} law {verdict.law}: "
-    if math.isfinite(verdict.value) and verdict.status == "failed":
+    if math.isfinite(verdict.value) and verdict.status == "failed" and verdict.check != BASELINE:
         return head + (
             f"{verdict.measure} {figure(verdict.value, verdict.unit)}, budget {figure(verdict.budget, verdict.unit)}"
         )
     return head + verdict.reason
 
 
-def text(verdicts: Sequence[Verdict]) -> str:
-    """Failures, a table by contestant, and all counts."""
-    bad = [verdict for verdict in verdicts if verdict.status in ("failed", "error", "unavailable")]
-    lines = [line(verdict) for verdict in bad[:MOST_LINES]]
+def text(verdicts: Sequence[Verdict], findings: Sequence[Finding] = ()) -> str:
+    """Failures with what a look into them found, a table by contestant, and all counts."""
+    bad = [verdict for verdict in verdicts if verdict.status in ("failed", "error", "unavailable", "incomparable")]
+    looked = {id(finding.verdict): finding for finding in findings}
+    bad.sort(key=lambda verdict: id(verdict) not in looked)
+    lines = [part for verdict in bad[:MOST_LINES] for part in _told(verdict, looked.get(id(verdict)))]
     if len(bad) > MOST_LINES:
         lines.append(f"... and {len(bad) - MOST_LINES} more")
     if lines:
         lines.append("")
     return "\n".join([*lines, by_contestant(verdicts), "", totals(verdicts)])
+
+
+def _told(verdict: Verdict, finding: Finding | None) -> list[str]:
+    if finding is None:
+        return [line(verdict)]
+    found = [f"first at t = {finding.time:.4g} s"] if math.isfinite(finding.time) else []
+    found += [f"bodies {', '.join(finding.bodies)}"] if finding.bodies else []
+    return ["; ".join([line(verdict), *found]), f"    {finding.shortest or finding.command}"]
 
 
 def by_contestant(verdicts: Sequence[Verdict]) -> str:
@@ -60,6 +73,15 @@ def totals(verdicts: Sequence[Verdict]) -> str:
         + ", ".join(parts)
         + (f"; {limited} passed by a limit that is not the derived one" if limited else "")
     )
+
+
+def limits_used(verdicts: Sequence[Verdict]) -> list[str]:
+    """Entries of budget files by which something passed that the derived budget would fail: for whom and how often."""
+    used: dict[tuple[str, str, str], list[Verdict]] = {}
+    for verdict in verdicts:
+        if verdict.status == "passed" and verdict.limit:
+            used.setdefault((verdict.contestant, verdict.check, verdict.limit), []).append(verdict)
+    return [f"{who} {check}, {len(those)} times ({limit})" for (who, check, limit), those in used.items()]
 
 
 def margins(verdicts: Sequence[Verdict]) -> str:

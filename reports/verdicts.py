@@ -15,21 +15,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from impactbench.reports.budget_file import Overrides, known_limits, overriding
 from impactbench.reports.budget_formulas import Setting
 from impactbench.reports.budgets import CHECKS, Check
-from impactbench.reports.cell import stack, step_count, step_seconds
+from impactbench.reports.cell import stack, step_seconds
 from impactbench.reports.measures import measure
 from impactbench.scenarios.records import Law
 from impactbench.scenarios.truth import Case
 
-Status = Literal["passed", "failed", "error", "unavailable", "unsupported", "excused"]
+Status = Literal["passed", "failed", "error", "unavailable", "unsupported", "excused", "incomparable"]
+STATUSES: tuple[Status, ...] = get_args(Status)
 PASSED, FAILED, INCOMPLETE, NO_BASELINE, NOTHING = 0, 1, 3, 4, 5
 KEPT = ("unsupported", "unavailable")
 """States of a cell that are statuses of its verdict; any other without figures is an error."""
+BASELINE = "baseline"
+"""The check of every cell that it is as it was accepted."""
 FINITE = "finite"
 """The check of every run that its numbers are numbers."""
 
@@ -39,7 +42,8 @@ class Verdict:
     """What one check says of one cell.
 
     status:  passed, failed; error (crashed, timed out, raised, or a figure is missing); unavailable (the engine is not
-             here); unsupported (the engine cannot express the case); excused (the check has no meaning there).
+             here); unsupported (the engine cannot express the case); excused (the check has no meaning there);
+             incomparable (no baseline to compare with).
     value, budget: the figure that counts and the largest allowed, in `unit`; NaN where there is none.
     limit:   why the budget is not the derived one; empty where it is.
     reason:  why not passed; empty where passed.
@@ -80,20 +84,27 @@ def judge(
     model: str = "minimal",
     phase: float = 0.0,
     checks: Sequence[Check] = CHECKS,
+    until: float = math.inf,
 ) -> list[Verdict]:
     """A verdict for every check, of one finite run at `step` (1/240, "no step" for an event-driven one).
 
-    `overrides` None means the known limits of the shipped adapters.
+    `until` [s] is where the run ended, if before its scene does. `overrides` None means the known limits of the shipped
+    adapters.
     """
     overrides = known_limits() if overrides is None else overrides
     seconds = step_seconds(step) if step != "no step" else step_seconds("1/240")
     setting = Setting(case, law, seconds)
     blank = Verdict("", case.scene.name, law, contestant, model, step, phase, "passed")
-    return [_judge(check, setting, figures, overrides, blank) for check in checks]
+    return [_judge(check, setting, figures, overrides, blank, until) for check in checks]
 
 
 def _judge(
-    check: Check, setting: Setting, figures: Mapping[str, float], overrides: Overrides, blank: Verdict
+    check: Check,
+    setting: Setting,
+    figures: Mapping[str, float],
+    overrides: Overrides,
+    blank: Verdict,
+    until: float,
 ) -> Verdict:
     case, law = setting.case, setting.law
     blank = replace(blank, check=check.name, measure=check.measure, unit=check.unit)
@@ -105,7 +116,7 @@ def _judge(
     budget = entry.budget(check, setting) if entry else derived
     blank = replace(blank, budget=budget, limit=f"{entry.source}: {entry.reason}" if entry else "")
     if check.measure not in figures:
-        return _absent(check, setting, blank)
+        return _absent(check, setting, blank, until)
     value = figures[check.measure]
     counted = check.excess(value) if math.isfinite(value) else math.nan
     if not math.isfinite(counted):
@@ -121,22 +132,23 @@ APART = 3
 """Steps between an impact and the next from which on a contestant must show it as one of its own."""
 
 
-def _absent(check: Check, setting: Setting, blank: Verdict) -> Verdict:
+def _absent(check: Check, setting: Setting, blank: Verdict, until: float) -> Verdict:
     """A figure that is not there: a failure where a run of the truth itself has it and its impacts are apart in time,
     so that a missed impact shows.
     """
     case, law, step = setting.case, setting.law, setting.step
-    times = [0.0, *(t for t in case.truths[law].impact_times if t < case.scene.duration)]
+    end = min(until, case.scene.duration)
+    times = [0.0, *(t for t in case.truths[law].impact_times if t < end), end]
     apart = all(later - sooner > APART * step for sooner, later in pairwise(times))
-    if apart and check.measure in _of_truth(case, law, step):
+    if apart and check.measure in _of_truth(case, law, step, end):
         return replace(blank, status="failed", reason=f"no {check.measure}: the truth has an impact, this run none")
     return replace(blank, status="excused", reason=f"no {check.measure}: contacts are not apart in time")
 
 
 @cache
-def _of_truth(case: Case, law: Law, step: float) -> frozenset[str]:
+def _of_truth(case: Case, law: Law, step: float, end: float) -> frozenset[str]:
     """Measures of a run that follows the truth exactly; none where the truth gives no states."""
-    truth, times = case.truths[law], np.arange(step_count(case.scene, step) + 1) * np.float64(step)
+    truth, times = case.truths[law], np.arange(max(1, round(end / step)) + 1) * np.float64(step)
     if truth.kind != "trajectory":
         return frozenset()
     states = [state for time in times if (state := truth.state(float(time))) is not None]
@@ -150,6 +162,7 @@ def judge_document(
     cases: Iterable[Case],
     overrides: Overrides | None = None,
     checks: Sequence[Check] = CHECKS,
+    until: float = math.inf,
 ) -> list[Verdict]:
     """Verdicts of every cell of a results document; one verdict for a cell that has no figures."""
     by_name = {case.scene.name: case for case in cases}
@@ -162,7 +175,7 @@ def judge_document(
         if cell["state"] == "ok":
             verdicts += judge(
                 by_name[cell["case"]], cell["law"], cell["step_text"], figures.get(number, {}),
-                cell["contestant"], overrides, cell["model"], cell["phase"], checks,
+                cell["contestant"], overrides, cell["model"], cell["phase"], checks, until,
             )  # fmt: skip
         else:
             verdicts.append(_without_figures(cell))
@@ -183,10 +196,10 @@ def _without_figures(cell: Mapping[str, Any]) -> Verdict:
 def counts(verdicts: Iterable[Verdict]) -> dict[str, int]:
     """How many verdicts of each status, in a fixed order."""
     found = Counter(verdict.status for verdict in verdicts)
-    return {status: found[status] for status in ("passed", "failed", "error", "unavailable", "unsupported", "excused")}
+    return {status: found[status] for status in STATUSES}
 
 
-def exit_code(verdicts: Sequence[Verdict], asked: Iterable[str] = (), baseline_missing: bool = False) -> int:
+def exit_code(verdicts: Sequence[Verdict], asked: Iterable[str] = ()) -> int:
     """0 all passed; 1 a check failed; 3 something could not be measured; 4 no baseline to compare with; 5 nothing was
     judged. In this order of precedence: 1, 3, 4, 5.
 
@@ -197,6 +210,6 @@ def exit_code(verdicts: Sequence[Verdict], asked: Iterable[str] = (), baseline_m
         return FAILED
     if number["error"] or any(v.status == "unavailable" and v.contestant in named for v in verdicts):
         return INCOMPLETE
-    if baseline_missing:
+    if number["incomparable"]:
         return NO_BASELINE
     return PASSED if number["passed"] else NOTHING

@@ -72,6 +72,10 @@ def verdict(status: str, contestant: str = "mujoco/tuned") -> Verdict:
         (["passed", "error"], 3),
         (["unsupported", "excused"], 5),
         ([], 5),
+        (["passed", "incomparable"], 4),
+        (["error", "incomparable"], 3),
+        (["failed", "incomparable"], 1),
+        (["unsupported", "incomparable"], 4),
         (["passed", "unavailable"], 0),
     ],
 )
@@ -81,5 +85,3 @@ def test_exit_codes_have_an_order(statuses: list[str], code: int) -> None:
 
 def test_an_engine_that_was_asked_for_and_is_missing_could_not_be_measured() -> None:
     assert exit_code([verdict("passed"), verdict("unavailable")], asked=["mujoco/tuned"]) == 3
-    assert exit_code([verdict("passed")], baseline_missing=True) == 4
-    assert exit_code([verdict("error")], baseline_missing=True) == 3
