@@ -15,6 +15,7 @@ from impactbench.reports.cli_hard import hard
 from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
 from impactbench.reports.cli_predictability import predictability
+from impactbench.reports.cli_report import diff, report
 from impactbench.reports.cli_sweep import Sweep, export, sweep_options
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
@@ -92,9 +93,11 @@ def compare(
     _write(document, folder)
     if cache:
         cache.prune()
+    from impactbench.reports.summary import verdict_lines
     from impactbench.reports.terminal import summary
 
     click.echo(summary(document))
+    click.echo("\n" + "\n".join(verdict_lines(document)))
     click.echo(f"report: {folder / 'report.html'}")
     if not any(cell["state"] == "ok" for cell in document["cells"]):
         sys.exit(NOTHING_MEASURED)
@@ -193,21 +196,6 @@ def advise(case: str, text: str, engines: tuple[str, ...], profile: str, steps: 
 
 
 @main.command()
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-def report(folder: Path) -> None:
-    """Render FOLDER/report.html again from FOLDER/results.json."""
-    from impactbench.reports import page, results
-
-    try:
-        page.write_page(results.read(folder / "results.json"), folder / "report.html")
-    except results.ResultsError as error:
-        raise click.UsageError(str(error)) from None
-    except OSError as error:
-        raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
-    click.echo(f"report: {folder / 'report.html'}")
-
-
-@main.command()
 @click.argument("engine")
 def conform(engine: str) -> None:
     """Try ENGINE against the engine contract, point by point.
@@ -293,6 +281,8 @@ main.add_command(limits)
 main.add_command(metamorphic)
 main.add_command(predictability)
 main.add_command(export)
+main.add_command(report)
+main.add_command(diff)
 main.add_command(hard)
 
 

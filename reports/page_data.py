@@ -6,6 +6,7 @@ A rung is one (case, policy, step); its figures are those of the worst impact ph
 from __future__ import annotations
 
 import decimal
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -29,9 +30,15 @@ def percent(value: float) -> str:
     return f"{100 * value:.3g} %".replace("-", "−", 1) if value < 0 else f"{100 * value:.3g} %"
 
 
+TURNING = re.compile(
+    "[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufefc\U00010800-\U00010fff\U0001e800-\U0001efff]"
+)
+"""Letters of scripts that run from right to left, and marks that change the direction."""
+
+
 def isolated(name: str) -> str:
     """Name that cannot turn the direction of the text around it; most names need nothing."""
-    return name if name.isascii() else f"\u2068{name}\u2069"
+    return f"\u2068{name}\u2069" if TURNING.search(name) else name
 
 
 def counted(number: int, noun: str) -> str:
@@ -89,8 +96,14 @@ def time_to(line: pd.DataFrame, target: float) -> pd.Series | None:
         if rung["state"] != "ok" or not rung["error"] <= target:
             break
         met.append(rung)
-    timed = [rung for rung in met if not np.isnan(rung["cost"])]
-    return min(timed, key=lambda rung: float(rung["cost"])) if timed else None
+    # What moves from event to event has no step to pay for: where nothing is timed it has no cost at all.
+    known = [rung for rung in met if not np.isnan(rung["cost"]) or not rung["timed"]]
+    return min(known, key=expense) if known else None
+
+
+def expense(rung: pd.Series) -> float:
+    """Cost of a rung to the digits that are shown; 0 where there is none."""
+    return 0.0 if np.isnan(rung["cost"]) else float(number(rung["cost"]))
 
 
 def order(line: pd.DataFrame) -> dict[str, Any] | None:

@@ -18,7 +18,6 @@ VIOLATIONS = {
     "momentum_drift": "Momentum: changed by what no contact could do",
     "angular_momentum_drift": "Angular momentum: changed without a torque",
     "penetration_max": "Non-penetration: bodies overlap",
-    "restitution_error": "Restitution: other than asked for",
 }
 """Measure -> the law it shows broken. The limit is that of the page's target."""
 FAULTS = ("diverged", "crashed", "timed out", "error")

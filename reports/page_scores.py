@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from impactbench.reports.page_data import TARGET, isolated, listing, number, price, rounded_up, time_to
+from impactbench.reports.page_data import TARGET, expense, isolated, listing, number, price, rounded_up, time_to
 
 if TYPE_CHECKING:
     from impactbench.reports.page_view import View
@@ -34,7 +34,7 @@ def score(view: View, case: str, policy: str) -> dict[str, Any]:
     ladder = []
     for _, rung in line.sort_values("step").iterrows():
         usable = rung["state"] == "ok" and not np.isnan(rung["error"])
-        cost = None if np.isnan(rung["cost"]) else number(rung["cost"]) if rung["timed"] else ""
+        cost = "" if not rung["timed"] else None if np.isnan(rung["cost"]) else number(rung["cost"])
         ladder.append([rounded_up(rung["error"]) if usable else None, cost, rung["step_text"]])
     rung = time_to(line, TARGET)
     if rung is None:
@@ -50,9 +50,7 @@ def reach(view: View, case: str, target: float = TARGET) -> str:
     """Which policies stay below the target, at what cost, and which do not get there."""
     lines = view.of(case)
     found = {policy: time_to(line, target) for policy, line in lines.items()}
-    reached = sorted(
-        ((float(number(r["cost"])), p, r) for p, r in found.items() if r is not None), key=lambda item: item[:2]
-    )
+    reached = sorted(((expense(r), p, r) for p, r in found.items() if r is not None), key=lambda item: item[:2])
     missed = [p for p, r in found.items() if r is None and (lines[p]["state"] == "ok").any()]
     silent = [p for p in lines if not (lines[p]["state"] == "ok").any()]
     best = [f"{isolated(p)} {price(rung)}" for _, p, rung in reached]

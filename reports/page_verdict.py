@@ -8,6 +8,7 @@ import pandas as pd
 from impactbench.reports.page_data import (
     TARGET,
     counted,
+    expense,
     isolated,
     listing,
     number,
@@ -101,7 +102,7 @@ def _cheapest(view: View) -> str:
         return ""
     case = view.cases[view.featured]
     found = [(p, r) for p, line in view.of(view.featured).items() if (r := time_to(line, TARGET)) is not None]
-    found.sort(key=lambda item: float(item[1]["cost"]))
+    found.sort(key=lambda item: expense(item[1]))
     where = isolated(words(case["family"]))
     if not found:
         return f"Nobody stays below {view.goal(case)} in {where}."

@@ -89,8 +89,10 @@ function price(rung) {
 }
 /** @param {number} target */
 const percent = (target) => `${Number((100 * target).toPrecision(3))} %`;
+// As in the report: letters that run from right to left, and marks that change the direction.
+const TURNING = /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufefc\u{10800}-\u{10fff}\u{1e800}-\u{1efff}]/u;
 /** @param {string} name */
-const isolated = (name) => (/^[\x00-\x7f]*$/.test(name) ? name : `\u2068${name}\u2069`);
+const isolated = (name) => (TURNING.test(name) ? `\u2068${name}\u2069` : name);
 /** @param {string[]} names */
 const listing = (names) => names.slice(0, 20).map(isolated).join(", ") + (names.length > 20 ? ` and ${names.length - 20} more` : "");
 
@@ -103,7 +105,7 @@ function sentence(row, target) {
     const ladder = page.ladders[row.dataset.row][index];
     if (!ladder) return;
     const best = score(ladder, target);
-    if (best) reached.push({ cost: Number(best[1]) || 1 / seconds(best[2]), policy, price: price(best) });
+    if (best) reached.push({ cost: Number(best[1]) || Number((1 / seconds(best[2])).toPrecision(3)), policy, price: price(best) });
     else missed.push(policy);
   });
   reached.sort((a, b) => a.cost - b.cost || (a.policy < b.policy ? -1 : 1));
