@@ -78,6 +78,7 @@ BREAKING = [
     (fakes.Slow, "bullet_wall[travel=1]", "approach"),
     (fakes.Dull, "bullet_wall[travel=1]", "rebound"),
     (fakes.Slow, "fast_flight[speed=10]", "speed"),
+    (fakes.Slow, "dispersing_billiard[ratio=1]", "energy"),
 ]
 
 
