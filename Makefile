@@ -6,10 +6,15 @@ STAMP := $(VENV)/installed
 # mypy and import-linter do not follow the editable finder; they do follow a folder of links.
 LINKS := $(VENV)/links
 
-.PHONY: compare test check format lint types layers tests browsers picture lock clean
+.PHONY: compare bench test check format lint types layers tests browsers picture lock clean
 
 compare: $(STAMP)
 	$(BIN)/impactbench compare --out out $(ARGS)
+
+# Speed of the reference, against the engines and against its own size; on a machine that does nothing else.
+bench: $(STAMP)
+	mkdir -p out
+	$(BIN)/impactbench bench --json out/bench.json $(ARGS)
 
 # What CI needs: every check and the tests.
 test: check

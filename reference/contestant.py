@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 from impactbench.reference.particles import build_bodies, build_pairs, check_supported
 from impactbench.reference.stepped import SWEEPS, Rules, run, start
+from impactbench.reference.swarm_run import Gas, why_not
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
@@ -17,6 +18,10 @@ STRATEGIES = {"stepped": "project", "revert": "revert"}
 
 TOUCH, STILL = 1e-10, 1e-13
 """Gap that counts as touching and speed that counts as none, next to the scene's length and speed."""
+
+
+LARGE = 64
+"""More movable bodies than this go to the fast runner, where it models all that they need."""
 
 
 class Stepped:
@@ -31,6 +36,31 @@ class Stepped:
             raise ValueError(f"{scene.name}: gravity {scene.gravity} must be finite")
         strategy = strategy_of(profile)
         check_supported(scene, law, model)
+        self._runner: Gas | AllPairs
+        if strategy == "project" and len(scene.movable) > LARGE and not why_not(scene, law, model):
+            self._runner = Gas(scene, model, step)
+        else:
+            self._runner = AllPairs(scene, law, strategy, model, step)
+        self.settings = {"law": law, "strategy": strategy, "axes": model.axes, **self._runner.settings}
+
+    def advance(self, steps: int) -> None:
+        self._runner.advance(steps)
+
+    def read(self) -> State:
+        return self._runner.read()
+
+    def figures(self) -> Mapping[str, float]:
+        """What the fast runner counts inside its steps; empty for the other."""
+        return self._runner.figures() if isinstance(self._runner, Gas) else {}
+
+    def close(self) -> None:
+        """Nothing is held outside Python's memory."""
+
+
+class AllPairs:
+    """Every handled pair is looked at in every step: any scene of particles, a few bodies."""
+
+    def __init__(self, scene: Scene, law: Law, strategy: str, model: Model, step: float) -> None:
         self._name, self._done = scene.name, 0
         self._bodies, self._pairs = build_bodies(scene), build_pairs(scene)
         self._movable = np.array(scene.movable, dtype=np.int64)
@@ -43,11 +73,8 @@ class Stepped:
             touch=TOUCH * scene.length,
             still=STILL * scene.speed,
         )
-        self.settings = {
-            "law": law,
-            "strategy": strategy,
+        self.settings: Mapping[str, object] = {
             "order": "detect, impacts, gravity, lasting contacts and friction, move, " + strategy,
-            "axes": model.axes,
             "touching gap [m]": self._rules.touch,
             "negligible speed [m/s]": self._rules.still,
             "sweeps at most": SWEEPS,
@@ -63,9 +90,6 @@ class Stepped:
 
     def read(self) -> State:
         return State(self._bodies.position[self._movable], self._bodies.velocity[self._movable])
-
-    def close(self) -> None:
-        """Nothing is held outside Python's memory."""
 
 
 def strategy_of(profile: str) -> str:

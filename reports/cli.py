@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from impactbench.reports.cli_bench import bench
 from impactbench.reports.cli_check import baseline, check, explain
 from impactbench.reports.cli_hard import hard
 from impactbench.reports.cli_limits import limits
@@ -284,6 +285,7 @@ main.add_command(export)
 main.add_command(report)
 main.add_command(diff)
 main.add_command(hard)
+main.add_command(bench)
 
 
 if __name__ == "__main__":
