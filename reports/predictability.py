@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from impactbench.adapters.contestants import Contestant, select
 from impactbench.reports.compare import law_of
-from impactbench.reports.relations import Trial
+from impactbench.reports.retold import Trial
 from impactbench.scenarios import transforms
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Law, Scene

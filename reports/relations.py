@@ -20,9 +20,10 @@ from typing import Any, Literal
 
 import numpy as np
 from impactbench.adapters.contestants import Contestant
-from impactbench.reports.cell import record, stack, step_count
+from impactbench.reports.cell import stack
+from impactbench.reports.retold import Trial, between, deviation, growth, rounding
 from impactbench.scenarios import transforms
-from impactbench.scenarios.engine import Engine, Unavailable, Unsupported
+from impactbench.scenarios.engine import Unavailable, Unsupported
 from impactbench.scenarios.records import Contact, Law, Model, Scene, shifted
 from impactbench.scenarios.trajectory import Trajectory
 from impactbench.scenarios.transforms import Similarity
@@ -47,11 +48,8 @@ MEANING = {
     "reversal": "back to the start with all velocities reversed, where nothing is lost",
     "phase": "begun 1/4, 1/2 and 3/4 of a step earlier",
 }
-SEED = 2.0**-30
-"""Size of the perturbation that measures `growth`: far above round-off, far below a step."""
 SENSITIVE = 1e6
 """Growth from which on a case says nothing of round-off: chaos, or a contact that the perturbation opens."""
-OPERATIONS = 8
 FINER = 4
 FACTOR = 1024.0
 
@@ -70,26 +68,6 @@ class Variant:
     time: float = 1.0
     extent: float = 0.0
     """Largest position [m] that the telling adds, in units of the original."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One contestant on one scene. It is loaded once: what a module remembers between runs must show."""
-
-    engine: type[Engine]
-    profile: str
-    law: Law
-    scene: Scene
-    step: float
-
-    def run(self, scene: Scene, time: float = 1.0, steps: int | None = None) -> Trajectory:
-        count = step_count(self.scene, self.step) if steps is None else steps
-        step = self.step * time
-        engine = self.engine(scene, self.law, self.profile, scene.model, step)
-        try:
-            return record(engine, step, count)
-        finally:
-            engine.close()
 
 
 def similar(scene: Scene, relation: str, label: str, kind: Kind, to: Similarity) -> Variant:
@@ -161,49 +139,7 @@ def try_case(argument: tuple[Contestant, Law, Scene, float]) -> dict[str, Any]:
         rows += [_settle("phase", "worst of 3", "step", lambda: _refined(trial, _phase))]
     again = Variant("repeat", "after all others", "exact", scene, lambda run: run, scene.model)
     rows += [_row(originals, trial, again)]
-    return {"state": "ok", "reason": "", "growth": grown, "rows": rows}
-
-
-def deviation(scene: Scene, base: Trajectory, other: Trajectory) -> float:
-    """The largest difference of two runs, in the scene's scales; infinite where the other is not finite."""
-    if not other.finite():
-        return math.inf
-    found = [
-        float(np.linalg.norm(other.positions - base.positions, axis=2).max()) / scene.length,
-        float(np.linalg.norm(other.velocities[-1] - base.velocities[-1], axis=1).max()) / scene.speed,
-    ]
-    if base.spins is not None and other.spins is not None:
-        spin = np.linalg.norm(other.spins[-1] - base.spins[-1], axis=1).max()
-        found.append(float(spin) * scene.length / scene.speed)
-    return max(found)
-
-
-def growth(trial: Trial, base: Trajectory) -> float:
-    """How much larger a small difference of all positions and of all velocities is at its largest."""
-    scene = trial.scene
-    signs = np.where(np.arange(len(scene.movable)) % 2 == 0, 1.0, -1.0)[:, None]
-    change = SEED * signs * np.isin(np.arange(3), scene.model.axes) * np.array([1.0, -0.6, 0.8])
-    start, found = base.state(0), 1.0
-    for x, v in ((scene.length * change, 0.0), (0.0, scene.speed * change)):
-        perturbed = replace(start, positions=start.positions + x, velocities=start.velocities + v)
-        try:
-            run = trial.run(transforms.restarted(scene, perturbed))
-        except Unsupported:
-            continue
-        found = max(found, deviation(scene, base, run) / SEED)
-    return found
-
-
-def rounding(trial: Trial, base: Trajectory, extent: float) -> float:
-    """What all rounded operations may add up to, in the scene's scales, where nothing grows."""
-    scene = trial.scene
-    reach = float(np.abs(base.positions).max()) + extent + max(_size(scene), scene.length)
-    operations = OPERATIONS * len(base.times) * max(1, len(scene.movable))
-    return operations * 2.0**-52 * max(reach, scene.speed * scene.duration) / scene.length
-
-
-def _size(scene: Scene) -> float:
-    return max(max(map(abs, body.position)) for body in scene.bodies)
+    return {"state": "ok", "reason": "", "growth": grown if math.isfinite(grown) else None, "rows": rows}
 
 
 Original = tuple[Trial, Trajectory, float]
@@ -234,6 +170,13 @@ class Found:
     memory: bool = False
     """Whether the engine may hold more than its state: what a contact remembers."""
 
+    def allowed(self, kind: Kind) -> float | None:
+        """None where it is judged by how it falls with the step."""
+        if kind == "step":
+            return None
+        grown = self.rounding * (self.growth if self.growth <= SENSITIVE else 1.0)
+        return 0.0 if kind == "exact" else grown
+
     def state(self, kind: Kind) -> str:
         if self.deviation == 0:
             return "exact"
@@ -257,10 +200,10 @@ def _settle(relation: str, label: str, kind: Kind, once: Callable[[], Found]) ->
         return row | {"state": "error", "note": f"{type(why).__name__}: {why}"}
     if not math.isfinite(found.deviation):
         return row | {"state": "diverged", "note": "the state is not finite"}
-    state, allowed = found.state(kind), 0.0 if kind == "exact" else found.rounding * found.growth
-    note = f"small differences grow {found.growth:.2g}-fold" if state == "sensitive" else found.note
-    allowed_here = None if kind == "step" or state == "sensitive" else allowed
-    return row | {"state": state, "deviation": found.deviation, "allowed": allowed_here, "note": note}
+    state = found.state(kind)
+    grown = f"grow {found.growth:.2g}-fold" if math.isfinite(found.growth) else "do as much as large ones"
+    note = f"small differences {grown}" if state == "sensitive" else found.note
+    return row | {"state": state, "deviation": found.deviation, "allowed": found.allowed(kind), "note": note}
 
 
 def _restart(trial: Trial, base: Trajectory, grown: float) -> Found:
@@ -307,13 +250,3 @@ def _phase(trial: Trial) -> float:
         run = trial.run(shifted(scene, part * trial.step), steps=len(base.times))
         found = max(found, deviation(scene, base, between(run, part)))
     return found
-
-
-def between(run: Trajectory, part: float) -> Trajectory:
-    """The run read `part` of a step after each sample but the last, by the cubic through both states."""
-    h, s = float(run.times[1] - run.times[0]), part
-    x0, x1, v0, v1 = run.positions[:-1], run.positions[1:], run.velocities[:-1], run.velocities[1:]
-    rise = s * s * (3 - 2 * s)
-    x = x0 + rise * (x1 - x0) + h * s * (1 - s) * ((1 - s) * v0 - s * v1)
-    spins = None if run.spins is None else run.spins[:-1] + s * (run.spins[1:] - run.spins[:-1])
-    return Trajectory(run.times[:-1], x, v0 + s * (v1 - v0), None, spins)

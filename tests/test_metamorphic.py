@@ -18,7 +18,8 @@ from impactbench.adapters.contestants import Contestant, select
 from impactbench.reports.cli import main
 from impactbench.reports.metamorphic import BAD, text, view, worst
 from impactbench.reports.page import environment
-from impactbench.reports.relations import RELATIONS, Trial, between, try_case
+from impactbench.reports.relations import RELATIONS, try_case
+from impactbench.reports.retold import Trial, between
 from impactbench.scenarios import catalogue, transforms
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import UPRIGHT, Body, Box, Capsule, Contact, HalfSpace, Model, Scene, Sphere

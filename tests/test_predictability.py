@@ -17,7 +17,7 @@ from impactbench.reports.measures import measure
 from impactbench.reports.page import environment
 from impactbench.reports.predictability import ROUNDING, SIZES, Copy, Horizon, growth_of, horizon, judge
 from impactbench.reports.predictability_view import text, view
-from impactbench.reports.relations import Trial
+from impactbench.reports.retold import Trial
 from impactbench.scenarios import catalogue, hard_chaos
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.hard_chaos import REACH, SPEED, dispersing_billiard, known_until, stretching
