@@ -9,15 +9,26 @@ from impactbench.scenarios.trajectory import Floats
 
 def multiply(p: Floats, q: Floats) -> Floats:
     """Turn by q, then by p."""
-    pw, pv, qw, qv = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
-    vector = pw * qv + qw * pv + np.cross(pv, qv)
-    return np.concatenate([pw * qw - (pv * qv).sum(-1, keepdims=True), vector], axis=-1)
+    pw, px, py, pz = p.T
+    qw, qx, qy, qz = q.T
+    turned = np.empty(q.shape)
+    turned[..., 0] = pw * qw - (px * qx + py * qy + pz * qz)
+    turned[..., 1] = pw * qx + qw * px + (py * qz - pz * qy)
+    turned[..., 2] = pw * qy + qw * py + (pz * qx - px * qz)
+    turned[..., 3] = pw * qz + qw * pz + (px * qy - py * qx)
+    return turned
 
 
 def rotate(q: Floats, v: Floats) -> Floats:
     """Vectors v, shape [n, 3], turned by q."""
-    t = 2 * np.cross(q[..., 1:], v)
-    return np.asarray(v + q[..., :1] * t + np.cross(q[..., 1:], t))
+    t = 2 * _cross(q[..., 1:], v)
+    return np.asarray(v + q[..., :1] * t + _cross(q[..., 1:], t))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """np.cross, whose checks of shapes cost more than all else of reading a state; same bits."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
 def about(axis: int, angles: Floats) -> Floats:

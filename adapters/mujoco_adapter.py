@@ -50,8 +50,8 @@ STIFF, CUSHION = "{!r} 1", "{!r} {!r}"
 takes back a fiftieth of an overlap per step while the damper stops the approach in one."""
 RIGID = "0.9999 0.9999 0.001 0.5 2"
 """solimp: constant impedance, or e would depend on depth."""
-LOST = (mj.mjtWarning.mjWARN_BADQPOS, mj.mjtWarning.mjWARN_BADQVEL, mj.mjtWarning.mjWARN_BADQACC)
-FULL_BUFFERS = (mj.mjtWarning.mjWARN_CONTACTFULL, mj.mjtWarning.mjWARN_CNSTRFULL)
+LOST = tuple(int(w) for w in (mj.mjtWarning.mjWARN_BADQPOS, mj.mjtWarning.mjWARN_BADQVEL, mj.mjtWarning.mjWARN_BADQACC))
+FULL_BUFFERS = tuple(int(w) for w in (mj.mjtWarning.mjWARN_CONTACTFULL, mj.mjtWarning.mjWARN_CNSTRFULL))
 
 
 class MuJoCo:
@@ -70,6 +70,7 @@ class MuJoCo:
         mj.set_mju_user_warning(lambda _: None)
         self._m = mj.MjModel.from_xml_string(self._xml())
         self._d = mj.MjData(self._m)
+        self._warnings = self._d.warning.number  # a view: asking for each by name takes longer than a step
         movable = [scene.bodies[i] for i in scene.movable]
         self._start = np.array([b.position for b in movable], dtype=float).reshape(-1, 3)
         self._turned = np.array([b.orientation for b in movable], dtype=float).reshape(-1, 4)
@@ -83,8 +84,8 @@ class MuJoCo:
         mj.mj_step(self._m, self._d, steps)
 
     def read(self) -> State:
-        warning = self._d.warning
-        if any(warning[w].number for w in FULL_BUFFERS):
+        warnings = self._warnings.tolist()
+        if any(warnings[w] for w in FULL_BUFFERS):
             raise RuntimeError("MuJoCo ran out of contact or constraint memory")
         n, k = len(self._start), len(self._axes)
         q, u = self._d.qpos.reshape(n, -1), self._d.qvel.reshape(n, -1)
@@ -94,7 +95,7 @@ class MuJoCo:
         else:
             x[:, self._axes] += q[:, :k]
         v[:, self._axes] = u[:, :k]
-        if any(warning[w].number for w in LOST):
+        if any(warnings[w] for w in LOST):
             # On a bad number the engine puts the whole world back to its start: that must not pass for a state.
             x[:], v[:] = math.nan, math.nan
         if not self._model.rotation:
@@ -103,7 +104,7 @@ class MuJoCo:
         return State(x, v, multiply(turn, self._turned), spin)
 
     def close(self) -> None:
-        del self._d, self._m
+        del self._warnings, self._d, self._m
 
     def _turns(self, q: Floats, u: Floats) -> tuple[Floats, Floats]:
         """Turns since t = 0 and world spins. A hinge is an angle; ball and free joints spin in the turned frame."""

@@ -37,10 +37,11 @@ class Cache:
         self.failed = 0
         self.broken = 0
         self.refused = ""
+        self._paths: dict[str, Path] = {}
 
     def get(self, cell: Cell, contestant: Contestant) -> dict[str, Any] | None:
         """The outcome of this cell as an earlier run left it; None where there is none that is whole."""
-        path = self._path(cell, contestant)
+        path = self._paths[cell.key] = self._path(cell, contestant)
         try:
             outcome = _parse(path.read_bytes())
             os.utime(path)
@@ -59,7 +60,7 @@ class Cache:
         """Keep an outcome, whole or not at all. A cache that cannot be written costs a note, never the sweep."""
         if outcome["state"] == "unavailable" or outcome["reason"].startswith(LOST):
             return
-        path = self._path(cell, contestant)
+        path = self._paths.get(cell.key) or self._path(cell, contestant)
         temporary = path.with_suffix(f".{os.getpid()}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

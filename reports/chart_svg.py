@@ -2,11 +2,29 @@
 
 from __future__ import annotations
 
+import functools
 import re
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import vl_convert
+
+
+@functools.cache
+def drawer() -> ThreadPoolExecutor:
+    """A thread that draws while the page is put together: the library draws without holding the interpreter."""
+    return ThreadPoolExecutor(1, "drawer")
+
+
+class Drawing:
+    """The static drawing of a specification, begun at once and waited for where it goes into the page."""
+
+    def __init__(self, spec: dict[str, Any], prefix: str) -> None:
+        self._drawn = drawer().submit(svg_of, spec, prefix)
+
+    def __html__(self) -> str:
+        return self._drawn.result()
 
 
 def svg_of(spec: dict[str, Any], prefix: str) -> str:

@@ -75,25 +75,13 @@ def compare(
     chosen, contestants, folder = cases_of(cases), contestants_of(engines, profile), writable_folder(out)
 
     from impactbench.reports.compare import LADDER, Plan
-    from impactbench.reports.compare import compare as run_comparison
 
     models = ("minimal", "full") if model == "both" else (model,)
     shifts = tuple(k / phases for k in range(phases))
     timing = "all" if sweep.full else timing
     plan = Plan(chosen, contestants, steps or LADDER, law, models, shifts, jobs, timing, replay)
-    cache = sweep.cache_in(folder)
-    with sweep.executor() as executor, progress_bar() as progress:
-        document = run_comparison(
-            plan,
-            shlex.join(["impactbench", *sys.argv[1:]]),
-            progress,
-            cache=cache,
-            executor=executor,
-            time_on_workers=sweep.time_on_workers,
-        )
+    document = sweep.run(plan, shlex.join(["impactbench", *sys.argv[1:]]), folder)
     _write(document, folder)
-    if cache:
-        cache.prune()
     from impactbench.reports.summary import verdict_lines
     from impactbench.reports.terminal import summary
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from impactbench.reports.cache import Cache
+    from impactbench.reports.compare import Plan, Progress
 
 FULL_HELP = "Time every case, at every phase; says beforehand how long it will take."
 CACHE_HELP = "Folder of outcomes kept for the next run; remove it to clear it. Default: OUT/.cache."
@@ -43,6 +44,24 @@ class Sweep:
         again = {None: (), "failed": FAILED, "all": STATES}[self.rerun]
         return Cache(self.cache or out / ".cache", again)
 
+    def run(self, plan: Plan, command: str, out: Path) -> dict[str, Any]:
+        """The comparison's document; says beforehand how long a full one will take, and afterwards how long it took."""
+        from impactbench.reports.compare import compare
+        from impactbench.reports.options import progress_bar
+
+        cache = self.cache_in(out)
+        with self.executor() as executor, progress_bar() as progress:
+            expected = _forecast(plan, progress) if self.full else None
+            document = compare(
+                plan, command, progress, cache=cache, executor=executor, time_on_workers=self.time_on_workers
+            )
+        if expected is not None:
+            document["provenance"]["expected_seconds"] = round(expected, 1)
+            click.echo(f"measured in {document['provenance']['seconds']:.0f} s; expected were {expected:.0f} s")
+        if cache:
+            cache.prune()
+        return document
+
     @contextmanager
     def executor(self) -> Iterator[Executor | None]:
         """The cluster's workers, or None for children of this process. A cluster's fault is one line."""
@@ -56,6 +75,18 @@ class Sweep:
                 yield workers
         except executors.ClusterError as why:
             raise click.UsageError(str(why)) from None
+
+
+def _forecast(plan: Plan, progress: Progress) -> float:
+    """Seconds the plan will take here; printed."""
+    from impactbench.reports.compare import ROUNDS, compile_reference
+    from impactbench.reports.estimate import estimate
+
+    if any(contestant.engine == "reference" for contestant in plan.contestants):
+        compile_reference(progress)
+    expected = estimate(plan.cells(), plan.timed(), plan.phases[0], ROUNDS, plan.jobs)
+    click.echo(str(expected))
+    return expected.seconds
 
 
 def sweep_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -15,6 +15,7 @@ from typing import Any
 import jinja2
 import vl_convert
 from impactbench.reports import results, sections
+from impactbench.reports.chart_svg import drawer
 from impactbench.reports.page_data import number, percent, words
 from impactbench.reports.page_view import View
 from markupsafe import Markup, escape
@@ -29,11 +30,12 @@ def write_page(document: dict[str, Any], path: Path | str) -> None:
 
 def render(document: dict[str, Any]) -> str:
     """The page of one results document, embedding as much of its data as fits the budget."""
+    script = drawer().submit(bundle)
     view = View(document)
     content = {**view.content(), "extra": sections.views(document)}
     template = environment().get_template("page.html")
     for note, data in view.embeddable():
-        page = template.render(**content, thinned=[*view.thinned, *note], data=data, bundle=bundle())
+        page = template.render(**content, thinned=[*view.thinned, *note], data=data, bundle=script.result())
         if len(page.encode()) <= BUDGET:
             break
     return page

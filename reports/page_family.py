@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from impactbench.reports import charts, charts_plain
-from impactbench.reports.chart_svg import rounded, svg_of
+from impactbench.reports.chart_svg import Drawing, rounded
 from impactbench.reports.page_data import amount, listing, order, words
 from impactbench.reports.page_scores import reach
 
@@ -99,7 +99,7 @@ def speed_chart(view: View, name: str, case: dict[str, Any], points: pd.DataFram
         plot = plot.properties(description=f"{cost} against {over}; the table below holds the same data")
         spec = rounded(plot.to_dict(validate=False))
     timed = bool(points["timed"].all())
-    return {"id": name, "spec": spec, "svg": svg_of(spec, name), "timed": timed, "over": over, "cost": cost}
+    return {"id": name, "spec": spec, "svg": Drawing(spec, name), "timed": timed, "over": over, "cost": cost}
 
 
 def convergence_chart(
@@ -113,7 +113,7 @@ def convergence_chart(
     with charts.debug_mode(False):
         plot = charts_plain.convergence(stepped[COLUMNS], orders, view.style, ("step [s]", over))
         plot = plot.properties(description=f"{over} against step; the table below holds the same data")
-        return {"id": name, "svg": svg_of(plot.to_dict(validate=False), name)}
+        return {"id": name, "svg": Drawing(plot.to_dict(validate=False), name)}
 
 
 def failures(view: View, case: str) -> pd.DataFrame:
