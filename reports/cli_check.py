@@ -6,6 +6,7 @@ import math
 import os
 import shlex
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -132,9 +133,12 @@ def _must_be_writable(outputs: Mapping[str, Any]) -> None:
 
     for name in ("junit", "summary", "failures"):
         path: Path | None = outputs.get(name)
-        if path and not os.access(path.parent, os.W_OK | os.X_OK):
-            why = "no such folder" if not path.parent.is_dir() else "permission denied"
-            raise click.UsageError(f"cannot write --{name} {path}: {why}")
+        if path:
+            try:
+                with tempfile.NamedTemporaryFile(dir=path.parent):
+                    pass
+            except OSError as error:
+                raise click.UsageError(f"cannot write --{name} {path}: {error.strerror}") from None
     if outputs.get("out"):
         writable_folder(outputs["out"])
 
