@@ -12,6 +12,8 @@ from impactbench.reports.replay_pack import restored, unpack
 from impactbench.scenarios.trajectory import Floats
 
 WIDTH, HEIGHT, MARGIN = 160, 120, 6
+SMALL = 6.0
+"""Radius in the panel's units below which a thick edge would hide the ball."""
 OBLIQUE = ((0.866, 0.5, 0.0), (-0.204, 0.353, 0.913))
 """Right and up of a view from above: azimuth -60 degrees, elevation 24 degrees, as the moving replay begins."""
 
@@ -103,9 +105,9 @@ class View:
         where, size = self.at(np.asarray(place, dtype=float)), body["size"]
         match body["kind"]:
             case "sphere":
-                return (
-                    f'<circle class="{kind}" cx="{where[0]:.1f}" cy="{where[1]:.1f}" r="{size[0] * self.scale:.1f}"/>'
-                )
+                radius = size[0] * self.scale
+                small = " small" if radius < SMALL else ""
+                return f'<circle class="{kind}{small}" cx="{where[0]:.1f}" cy="{where[1]:.1f}" r="{radius:.1f}"/>'
             case "plane":
                 return self.plane(np.array(size), np.asarray(place, dtype=float))
             case "capsule":

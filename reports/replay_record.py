@@ -185,6 +185,7 @@ def largest_of(column: Floats, every: int) -> Floats:
 def contacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory]) -> list[list[float | int]]:
     """Contacts by start: [start s, end s, body a, body b, body the mark is on, offset of the mark from its centre m].
 
+    The offset turns with the body, save on a ball: what a ball touches stays where it is while the ball rolls on.
     A pair touches where its gap is at most a thousandth of the scene's length, or where its relative velocity jumped
     in the step before: an impact may lie between two samples.
     """
@@ -198,6 +199,9 @@ def contacts(scene: Scene, trajectory: Trajectory, pairs: list[PairHistory]) -> 
         for first, last in episodes(touching):
             on, sign = (pair.a, 1) if _rounder(scene, pair) else (pair.b, -1)
             offset = towards(bodies[on], first, sign * pair.normal[first])
+            if not isinstance(scene.bodies[on].shape, Sphere):
+                axes = bodies[on].axes
+                offset = axes[first if len(axes) > 1 else 0].T @ offset
             ends = [round(float(trajectory.times[k]), 6) for k in (first, last)]
             found.append([*ends, pair.a, pair.b, on, *(float(f"{x:.4g}") for x in offset)])
     return sorted(found)

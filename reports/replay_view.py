@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 from urllib.parse import quote
@@ -89,7 +90,8 @@ def staged(cases: list[dict[str, Any]], featured: str | None) -> dict[str, Any]:
 
     def rank(case: dict[str, Any]) -> tuple[bool, bool, float]:
         parted = case["apart"] or {"visible": False, "distance": 0.0}
-        return parted["visible"], case["case"] == featured, parted["distance"] / case["length"]
+        picture = math.dist(case["camera"]["low"], case["camera"]["high"])
+        return parted["visible"], case["case"] == featured, parted["distance"] / picture
 
     return max(cases, key=rank)
 
@@ -146,7 +148,7 @@ def plots(contestants: list[str], style: charts.Style, limit: float) -> dict[str
 
 def one_plot(name: str, title: str, colour: alt.Color, limit: float) -> alt.LayerChart | alt.FacetChart:
     """One measure over time, with its limit, the contacts and the replay's time."""
-    time = alt.X("t:Q", title="time [s]" if name == list(TITLES)[-1] else None)
+    time = alt.X("t:Q", scale=alt.Scale(nice=False), title="time [s]" if name == list(TITLES)[-1] else None)
     value = alt.Y("value:Q", title=title, axis=alt.Axis(format="~%", tickCount=4))
     focus, others = (
         alt.Chart(alt.NamedData(name + part)).encode(x=time, y=value, color=colour) for part in ("", " of others")
@@ -157,14 +159,14 @@ def one_plot(name: str, title: str, colour: alt.Color, limit: float) -> alt.Laye
         focus.mark_line(strokeWidth=2.4).encode(tooltip=tips),
         alt.Chart(alt.NamedData("contacts")).mark_tick(color=charts.INK, opacity=0.7, height=8, thickness=1.2)
         .encode(x="t:Q", y=alt.value(76)),
-        alt.Chart(alt.NamedData("once")).transform_calculate(now="now").mark_rule(color=charts.INK, strokeWidth=1)
-        .encode(x="now:Q"),
+        alt.Chart(alt.NamedData("once")).transform_calculate(now="now")
+        .mark_rule(color=charts.INK, strokeWidth=1, aria=False).encode(x="now:Q"),
     ]  # fmt: skip
     if name == "energy":
         known = alt.Chart(alt.NamedData("expected"))
         layers.insert(0, known.mark_area(opacity=0.15, color=charts.INK).encode(x="t:Q", y="low:Q", y2="high:Q"))
         layers.insert(1, known.mark_line(color=charts.INK, strokeDash=[6, 4]).encode(x="t:Q", y="value:Q"))
     else:
-        edge = alt.Chart(alt.NamedData("once")).mark_rule(color=charts.INK, strokeDash=[2, 3])
+        edge = alt.Chart(alt.NamedData("once")).mark_rule(color=charts.INK, strokeDash=[2, 3], aria=False)
         layers.insert(0, edge.encode(y=alt.datum(limit, type="quantitative")))
     return alt.layer(*layers, name=name, width=640, height=80)

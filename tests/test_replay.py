@@ -12,8 +12,10 @@ import pytest
 from impactbench.adapters import contestants
 from impactbench.reports import replay, replay_pack, replay_record, replay_tracks
 from impactbench.reports.cell import Cell, case_named, run_cell
+from impactbench.reports.compare import TIMED, Plan
+from impactbench.reports.geometry import rotation_matrices
 from impactbench.scenarios import catalogue
-from impactbench.scenarios.records import Law
+from impactbench.scenarios.records import Capsule, Law
 from impactbench.scenarios.trajectory import Floats, Trajectory
 from impactbench.scenarios.truth import Case
 from numpy.typing import NDArray
@@ -176,3 +178,28 @@ def test_cells_that_did_not_run_are_named_with_their_reason() -> None:
     (found,) = replay.replays({BALL: case}, [BALL], entries, outcomes, 1)["cases"]
     assert found["not_recorded"] == [{"contestant": "mujoco/tuned", "reason": "crashed: SIGSEGV"}]
     assert [(run["contestant"], run["step_text"]) for run in found["runs"]] == [("pymunk/tuned", "1/240")]
+
+
+def test_a_contact_mark_sits_where_the_bodies_touch_while_a_rod_turns() -> None:
+    case = case_named("rod_drop[angle=30,bounciness=1]")
+    (contestant,) = contestants.select(["pybullet/default"])
+    cell = Cell(case.scene.name, "nc", "pybullet/default", "minimal", "1/240")
+    run = replay_record.record_run((cell, contestant, 1))
+    start, end, static, _, on, *offset = run["contacts"][0]
+    first, last = round(start / STEP), round(end / STEP)
+    rod = case.scene.bodies[on].shape
+    assert case.scene.bodies[static].static
+    assert isinstance(rod, Capsule)
+    assert last > first + 10  # it stays down and turns
+    for step in (first, last):
+        arm = rotation_matrices(run["orientations"][step : step + 1])[0, 0] @ offset
+        # On the floor, z = 0, but for the touching distance and the rim that the end's half ball rolls over.
+        assert abs(run["positions"][step, 0, 2] + arm[2]) <= 1e-3 * case.scene.length + rod.radius
+    assert np.linalg.norm(offset) > rod.half_length
+
+
+def test_the_recorded_case_of_a_family_is_the_timed_one() -> None:
+    names = Plan(catalogue.all_cases(), contestants.select(["mujoco/tuned"])).replayed()
+    families = dict.fromkeys(case.scene.family for case in catalogue.all_cases())
+    assert set(TIMED) <= set(names)
+    assert [name.partition("[")[0] for name in names] == list(families)

@@ -1,4 +1,4 @@
-// Replay, second part: one time and one camera for every panel, controls, keys, deep links, conservation over time.
+// Replay, third part: one time and one camera for every panel, controls, keys, deep links, conservation over time.
 
 /** @typedef { {scene: string, runs: string[], focus: string, time: number, playing: boolean, speed: number, angle: number} } State */
 
@@ -9,7 +9,7 @@ const still = matchMedia("(prefers-reduced-motion: reduce)");
 /** @type {State} */
 const state = { scene: "", runs: [], focus: "", time: 0, playing: false, speed: 1, angle: -60 };
 const decoded = new Map(); // case name -> scene with runs and truths decoded
-let ink, panels = [], plots = null, pending = 0;
+let ink, panels = [];
 
 /** A case with its tracks decoded: once, when it is first looked at. */
 function sceneOf(name) {
@@ -25,12 +25,6 @@ async function decode(scene) {
   return { ...scene, rows, runs: await Promise.all(runs), truths: Object.fromEntries(await Promise.all(truths)) };
 }
 
-/** Value of a series of a run at a time; NaN where there is none. */
-function seriesAt(scene, run, name, time) {
-  const frame = Math.min(Math.ceil(time / scene.frame - 1e-6), run.motion.frames - 1);
-  return valueOf(run.motion.rest[1][recorded.series.indexOf(name) * run.motion.frames + frame]);
-}
-
 /** The truth of a run's law at a time, where it is known. */
 function ghostAt(scene, law, time) {
   const truth = scene.truths[law];
@@ -38,8 +32,6 @@ function ghostAt(scene, law, time) {
   return truth.rest[0][frame] ? truth : null;
 }
 
-const percentText = (x) => (Number.isNaN(x) ? "–" : `${Number((100 * x).toPrecision(2))} %`.replace("-", "−"));
-const secondsText = (t) => `${t.toFixed(3)} s`;
 const endOf = (scene) => (scene.frames - 1) * scene.frame;
 
 // Panels ------------------------------------------------------------------------------------------------------------
@@ -158,12 +150,6 @@ function run(scene, before) {
   requestAnimationFrame(tick);
 }
 
-let moved = 0;
-function moveCursor() {
-  moved = performance.now();
-  if (plots) plots.view.signal("now", state.time).runAsync();
-}
-
 /** Jump to an event of the run in focus, and say what it is. */
 async function jump(name) {
   const scene = await sceneOf(state.scene);
@@ -182,39 +168,6 @@ function eventText(name, found) {
 
 const say = (text) => { part("status").textContent = text; };
 const focused = (scene) => scene.runs.find((r) => r.contestant === state.focus);
-
-// Conservation over time --------------------------------------------------------------------------------------------
-
-/** The focused run's conservation, the other shown runs faint behind it, the energy its law leaves dashed. */
-async function plot() {
-  const ticket = ++pending;
-  const scene = await sceneOf(state.scene), spec = JSON.parse(part("plots-spec").textContent);
-  const focus = focused(scene), truth = scene.truths[focus.law];
-  const others = scene.runs.filter((r) => state.runs.includes(r.contestant) && r !== focus);
-  const rows = (name, some) => some.flatMap((r) => [...Array(r.motion.frames).keys()].map((frame) => ({
-    t: frame * scene.frame, run: r.contestant, value: seriesAt(scene, r, name, frame * scene.frame),
-  }))).filter((row) => !Number.isNaN(row.value));
-  const expected = [...Array(truth.frames).keys()].map((frame) => ({
-    t: frame * scene.frame, value: valueOf(truth.rest[0][truth.frames + frame]) })).filter((row) => !Number.isNaN(row.value));
-  const limit = recorded.limit;
-  spec.datasets = {
-    once: [{}],
-    contacts: focus.contacts.map(([start]) => ({ t: start })),
-    expected: expected.map((row) => ({ ...row, low: row.value - limit, high: row.value + limit })),
-    ...Object.fromEntries(recorded.series.map((name) => [name, rows(name, [focus])])),
-    ...Object.fromEntries(recorded.series.map((name) => [`${name} of others`, rows(name, others)])),
-  };
-  spec.vconcat = spec.vconcat.filter((child) => spec.datasets[child.name].length);
-  for (const child of spec.vconcat) child.layer = child.layer.filter((layer) => spec.datasets[layer.data.name].length);
-  part("plots-title").textContent = `Conservation over time: ${focus.contestant} in ${scene.case}`;
-  const place = document.createElement("div");
-  const made = await window.vegaEmbed(place, spec, { renderer: "svg", actions: false });
-  if (ticket !== pending) return made.finalize(); // another run was chosen meanwhile
-  if (plots) plots.finalize();
-  plots = made;
-  part("plots").replaceChildren(place);
-  moveCursor();
-}
 
 // Choice of scene and runs ------------------------------------------------------------------------------------------
 

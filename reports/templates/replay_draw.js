@@ -211,7 +211,7 @@ function drawPanel(pen, camera, scene, run, ghost, time, ink, still) {
       pen.fill();
     }
     pen.strokeStyle = ink.line;
-    pen.lineWidth = level > 3 ? 2.5 : 1;
+    pen.lineWidth = (level > 3 ? 2.5 : 1.2) * Math.min(1, (pose.body.size[0] * camera.scale) / 8); // thin about small bodies
     pen.stroke();
     if (run.motion.turns && pose.body.kind === "sphere") drawSpoke(pen, camera, pose);
   }
@@ -259,7 +259,10 @@ function drawContacts(pen, camera, poses, contacts, time, ink, still) {
   for (const [start, end, , , on, ...offset] of contacts) {
     if (start > time) break; // they are in order of their start
     if (time > Math.max(end, start + FLASH)) continue;
-    const point = poses[on].place.map((c, k) => c + offset[k]);
+    const { place, turn, body } = poses[on];
+    const axes = body.kind === "sphere" ? null : axesOf(turn); // a ball rolls over what it touches
+    const arm = axes ? [0, 1, 2].map((k) => axes[0][k] * offset[0] + axes[1][k] * offset[1] + axes[2][k] * offset[2]) : offset;
+    const point = place.map((c, k) => c + arm[k]);
     const x = acrossOf(camera, point), y = downOf(camera, point), age = (time - start) / FLASH;
     pen.beginPath();
     if (age <= 1) pen.arc(x, y, still ? 7 : 4 + 7 * age, 0, 2 * Math.PI);
