@@ -101,7 +101,7 @@ class Cache:
 
 
 def _text(outcome: dict[str, Any]) -> bytes:
-    figures = [[figure.measure, figure.value] for figure in outcome.get("figures", [])]
+    figures = [[figure.measure, figure.value, figure.time, figure.bodies] for figure in outcome.get("figures", [])]
     plain = {**outcome, "figures": figures} if "figures" in outcome else outcome
     text = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
     return hashlib.sha256(text).hexdigest().encode() + b"\n" + text
@@ -114,5 +114,7 @@ def _parse(content: bytes) -> dict[str, Any]:
         raise ValueError("damaged")
     outcome = dict(json.loads(text))
     if "figures" in outcome:
-        outcome["figures"] = [Figure(measure, value) for measure, value in outcome["figures"]]
+        outcome["figures"] = [
+            Figure(name, value, time, tuple(bodies)) for name, value, time, bodies in outcome["figures"]
+        ]
     return outcome

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from typing import Any
 
-from impactbench.adapters.contestants import Contestant
+from impactbench.adapters.contestants import CONTESTANTS, Contestant
 from impactbench.adapters.isolation import Job, Outcome, run_jobs
 from impactbench.reports import executors, machine, results
 from impactbench.reports.cache import Cache
@@ -133,9 +133,7 @@ def compare(
         "cells": [],
         "rows": [],
         "law_difference": [
-            {"case": case.scene.name, **asdict(figure), "unit": figure.unit}
-            for case in plan.cases
-            for figure in law_difference(case)
+            {"case": case.scene.name, **figure.row()} for case in plan.cases for figure in law_difference(case)
         ],
     }
     outcomes = accuracy_lane(cells, plan.jobs, progress, cache, executor)
@@ -149,11 +147,12 @@ def compare(
         progress("replays", 1, 1)
     for cell, contestant in cells:
         outcome = outcomes[cell.key]
-        document["cells"].append(_cell_record(cell, contestant, outcome))
+        repeats = {"repeats": timings[cell.key]} if timings.get(cell.key) else {}
+        document["cells"].append(_cell_record(cell, contestant, outcome) | repeats)
         figures: list[Figure] = outcome.get("figures", [])
         figures = [*figures, *(timing_figures(timings[cell.key]) if timings.get(cell.key) else [])]
         index = len(document["cells"]) - 1
-        document["rows"] += [{"cell": index, "measure": f.measure, "value": f.value, "unit": f.unit} for f in figures]
+        document["rows"] += [{"cell": index, **figure.row()} for figure in figures]
     document["provenance"]["seconds"] = round(time.monotonic() - begun, 1)
     return document
 
@@ -285,6 +284,7 @@ def describe(case: Case) -> dict[str, Any]:
         "energy": scene.energy,
         "parameters": scene.parameters,
         "model": asdict(scene.model),
+        "in_catalogue": not case.from_file,
     }
 
 
@@ -302,5 +302,7 @@ def provenance(command: str, contestants: Iterable[Contestant], load: float) -> 
         "commit": machine.commit(),
         "versions": {c.engine: c.version() for c in contestants} | {"numpy": metadata.version("numpy")},
         "load": load,
+        "clock_seconds": machine.clock_seconds(),
+        "engines": {c.name: c.factory for c in contestants if c not in CONTESTANTS},
         "notes": [f"the machine was busy when this began (load {load:.1f}): times may be too long"] if busy else [],
     }

@@ -18,6 +18,8 @@ from impactbench.scenarios.truth import Case, Truth
 COMPARED_TIMES = 60
 """Trajectory errors are taken at about this many steps, spread evenly over the run, the last one included."""
 
+EXPLAINED = 1e-3
+"""A tenth of the error that reports ask for by default: from here on a figure says when it was reached."""
 TIMES = ("wall_time", "wall_time_min", "wall_time_low", "wall_time_high")
 UNITS = {"impact_time_error": "s"} | dict.fromkeys(TIMES, "s/s")
 """Units of the measures that are not dimensionless."""
@@ -29,6 +31,16 @@ class Figure:
 
     measure: str
     value: float
+    time: float | None = None
+    """When it was reached [s], where one instant can be named."""
+    bodies: tuple[str, ...] = ()
+
+    def row(self) -> dict[str, object]:
+        """As results hold it; time and bodies only where there is more than round-off to explain."""
+        found: dict[str, object] = {"measure": self.measure, "value": self.value, "unit": self.unit}
+        if self.time is not None and abs(self.value) > EXPLAINED:
+            found |= {"time": self.time, "bodies": list(self.bodies)} if self.bodies else {"time": self.time}
+        return found
 
     @property
     def unit(self) -> str:
@@ -48,7 +60,7 @@ def measure(case: Case, law: Law, trajectory: Trajectory, delay: float = 0.0) ->
         *_against_truth(scene, case.truths[law], trajectory, delay),
         *_conserved(scene, law, case.truths[law], trajectory, pairs, impacts, delay),
         *_at_impacts(scene, law, case.truths[law], trajectory, impacts, delay),
-        *_penetration(scene, pairs),
+        *_penetration(scene, pairs, trajectory),
     ]
 
 
@@ -89,18 +101,24 @@ def _conserved(
     impacts: list[Impact],
     delay: float,
 ) -> Iterator[Figure]:
-    yield Figure("momentum_drift", conservation.momentum_drift(scene, law, trajectory, pairs))
-    angular = conservation.angular_momentum_drift(scene, law, trajectory, impacts)
+    yield largest("momentum_drift", conservation.momentum_drifts(scene, law, trajectory, pairs), trajectory)
+    angular = conservation.angular_momentum_drifts(scene, law, trajectory, impacts)
     if angular is not None:
-        yield Figure("angular_momentum_drift", angular)
+        yield largest("angular_momentum_drift", angular, trajectory)
     raw, offset = conservation.energies(scene, trajectory), conservation.matched_offset(scene, trajectory)
     matched = raw + offset
     yield Figure("offset_energy", float(np.abs(offset).max()) / scene.energy)
-    yield Figure("energy_gain", float((matched - np.minimum.accumulate(matched)).max()) / scene.energy)
+    yield largest("energy_gain", (matched - np.minimum.accumulate(matched)) / scene.energy, trajectory)
     expected = _expected_energy(scene, law, truth, trajectory, delay)
     if expected is not None:
         yield Figure("energy_drift", float(matched[-1] - expected) / scene.energy)
         yield Figure("energy_drift_raw", float(raw[-1] - expected) / scene.energy)
+
+
+def largest(measure: str, series: Floats, trajectory: Trajectory) -> Figure:
+    """The largest of a series over the run's times, shape [T], and when it was reached first."""
+    index = int(series.argmax())
+    return Figure(measure, float(series[index]), float(trajectory.times[index]))
 
 
 def _expected_energy(scene: Scene, law: Law, truth: Truth, trajectory: Trajectory, delay: float) -> float | None:
@@ -154,12 +172,16 @@ def _at_impacts(
         yield Figure("impact_time_error", impacts[0].time - delay - truth.impact_times[0])
 
 
-def _penetration(scene: Scene, pairs: list[PairHistory]) -> Iterator[Figure]:
+def _penetration(scene: Scene, pairs: list[PairHistory], trajectory: Trajectory) -> Iterator[Figure]:
     """Deepest overlap of any pair over all steps, its root mean square over time, and the overlap left at the end."""
     if not pairs:
         return
-    depth = np.maximum(-np.min([pair.gap for pair in pairs], axis=0), 0.0) / scene.length
-    yield Figure("penetration_max", float(depth.max()))
+    gaps = np.array([pair.gap for pair in pairs])
+    depth = np.maximum(-gaps.min(axis=0), 0.0) / scene.length
+    deepest = int(depth.argmax())
+    pair = pairs[int(gaps[:, deepest].argmin())]
+    bodies = (scene.bodies[pair.a].name, scene.bodies[pair.b].name)
+    yield Figure("penetration_max", float(depth[deepest]), float(trajectory.times[deepest]), bodies)
     yield Figure("penetration_rms", float(np.sqrt(np.mean(depth**2))))
     yield Figure("penetration_final", float(depth[-1]))
 

@@ -66,7 +66,7 @@ def listing(items: Iterable[Any], limit: int = 6) -> str:
 def tidy_cells(document: dict[str, Any]) -> pd.DataFrame:
     """Cells with the policy each belongs to: contestant, and model and law where it ran several."""
     columns = ["case", "family", "law", "contestant", "model", "step", "step_text", "phase", "state", "reason"]
-    cells = pd.DataFrame(document["cells"]).reindex(columns=[*columns, "version", "settings"])
+    cells = pd.DataFrame(document["cells"]).reindex(columns=[*columns, "version", "settings", "repeats"])
     cells["step"] = pd.to_numeric(cells["step"]).fillna(0.0)  # 0: moves from event to event
     cells[["step_text", "reason"]] = cells[["step_text", "reason"]].fillna("").astype(str)
     cells["state"] = cells["state"].fillna("error")

@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from impactbench.reports import charts, charts_plain, page_failures, page_scores, page_verdict, replay_view
+from impactbench.reports import (
+    charts,
+    charts_plain,
+    page_failures,
+    page_scores,
+    page_timing,
+    page_verdict,
+    replay_view,
+)
 from impactbench.reports.page_data import TARGET, TARGETS, percent, tidy_cells, tidy_rungs
 from impactbench.reports.page_family import MAX_CHARTS, section
 
@@ -98,6 +106,8 @@ class View:
             "blank": charts_plain.blank(self.style),
             "targets": TARGETS,
             "target": TARGET,
+            "timing": page_timing.timing(self),
+            "savings": page_timing.savings(self),
             "statuses": page_scores.statuses(self),
             "settings": page_scores.settings(self),
             "versions": self.cells.drop_duplicates("contestant")[["contestant", "version"]]

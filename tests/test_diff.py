@@ -92,7 +92,7 @@ def test_what_cannot_be_compared_says_why() -> None:
     assert verdicts(one(0.01, law="nc"), one(0.02, law="doc"))["state"] == (UNKNOWN, "other law (doc, nc)")
     assert verdicts(one(0.01), one(0.02, model="full"))["state"] == (UNKNOWN, "other model (full, minimal)")
     assert verdicts(one(0.01), one(0.02, phase=0.5))["state"] == (UNKNOWN, "other impact phases")
-    assert verdicts(one(0.01), one(0.02, step_text="1/61"))["state"] == (UNKNOWN, "not measured before")
+    assert verdicts(one(0.01), one(0.02, step_text="1/61"))["state"] == (UNKNOWN, "not measured after")
     longer = one(0.02)
     longer["cases"][0]["duration"] = 2.0
     assert verdicts(one(0.01), longer)["state"] == (UNKNOWN, "the case is defined otherwise (duration)")

@@ -23,7 +23,8 @@ def case(name: str, family: str, **changes: Any) -> dict[str, Any]:
     """One case as a results document holds it."""
     found = {
         "name": name, "family": family, "question": f"What does {family} show?", "headline": "position_error",
-        "laws": "newton", "duration": 1.0, "length": 1.0, "speed": 1.0, "energy": 1.0,
+        "laws": ["newton"], "truth": {"newton": "trajectory"}, "parameters": {},
+        "duration": 1.0, "length": 1.0, "speed": 1.0, "energy": 1.0,
         "model": {"axes": ["z"], "rotation": False},
     }  # fmt: skip
     return {**found, **changes}

@@ -1,0 +1,69 @@
+"""Timing in detail, and what the smallest model of a scene saves against the full one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from impactbench.reports.page_data import number, percent
+
+if TYPE_CHECKING:
+    from impactbench.reports.page_view import View
+
+
+def timing(view: View) -> dict[str, Any] | None:
+    """Every repeat of every timed cell, and the harness' own share of a run; None where nothing was timed."""
+    timed = view.cells[view.cells["repeats"].map(lambda found: isinstance(found, list) and bool(found))]
+    if not len(timed):
+        return None
+    rows = [
+        {
+            "case": cell["case"],
+            "policy": cell["policy"],
+            "step": cell["step_text"],
+            "median": 1e3 * float(np.median(cell["repeats"])),
+            "least": 1e3 * min(cell["repeats"]),
+            "repeats": " ".join(number(1e3 * seconds) for seconds in cell["repeats"]),
+        }
+        for _, cell in timed.iterrows()
+    ]
+    return {"rows": rows, "overhead": _overhead(view, timed)}
+
+
+def _overhead(view: View, timed: pd.DataFrame) -> str:
+    """The clock's own time as a part of the shortest run that was timed."""
+    clock = view.document["provenance"].get("clock_seconds")
+    if clock is None:
+        return ""
+    shortest = min(min(c["repeats"]) * view.cases[c["case"]]["duration"] for _, c in timed.iterrows())
+    return f"The harness' own share of a timed run is {clock * 1e6:.2g} µs, at most {percent(clock / shortest)} of it."
+
+
+def savings(view: View) -> list[dict[str, Any]]:
+    """Time and error of the smallest and the full model of a case, at the finest step both ran at."""
+    found = []
+    for (case, policy), full in view.lines.items():
+        if not policy.endswith(" · full") and " · full · " not in policy:
+            continue
+        small = view.lines.get((case, policy.replace(" · full", "")))
+        if small is None:
+            continue
+        both = small[small["state"] == "ok"].merge(full[full["state"] == "ok"], on="step", suffixes=("", "_full"))
+        if not len(both):
+            continue
+        rung = both.sort_values("step").iloc[0]
+        timed = rung["timed"] and rung["timed_full"]
+        found.append(
+            {
+                "case": case,
+                "policy": policy.replace(" · full", ""),
+                "step": rung["step_text"],
+                "small": rung["cost"] if timed else np.nan,
+                "full": rung["cost_full"] if timed else np.nan,
+                "saved": percent(1 - rung["cost"] / rung["cost_full"]) if timed else "not timed",
+                "error": rung["error"],
+                "change": rung["error"] - rung["error_full"],
+            }
+        )
+    return found
