@@ -9,14 +9,35 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from impactbench.scenarios import hard_chaos, hard_fast, hard_stacks
+from impactbench.scenarios import (
+    hard_chaos,
+    hard_fast,
+    hard_gas,
+    hard_impacts,
+    hard_runs,
+    hard_scales,
+    hard_sequences,
+    hard_stacks,
+    hard_structures,
+)
 from impactbench.scenarios.naming import Parameters, case_name
 from impactbench.scenarios.records import Scene
 from impactbench.scenarios.survival import Criterion, HardFamily
 from impactbench.scenarios.truth import Case
 
 HARD: dict[str, HardFamily] = {
-    family.name: family for family in (*hard_stacks.FAMILIES, *hard_fast.FAMILIES, *hard_chaos.FAMILIES)
+    family.name: family
+    for family in (
+        *hard_stacks.FAMILIES,
+        *hard_structures.FAMILIES,
+        *hard_fast.FAMILIES,
+        *hard_impacts.FAMILIES,
+        *hard_sequences.FAMILIES,
+        *hard_runs.FAMILIES,
+        *hard_scales.FAMILIES,
+        *hard_gas.FAMILIES,
+        *hard_chaos.FAMILIES,
+    )
 }
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from impactbench.scenarios.hard import case_named
+from impactbench.scenarios.pieces import opening, turn
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
 
 class Truthful:
-    """Replays the scene's own truth; bodies of a scene without one stay where they are or fly on."""
+    """Replays the scene's own truth; where there is none, the start."""
 
     def __init__(self, scene: Scene, law: Law, profile: str, model: Model, step: float) -> None:
         self.settings: dict[str, object] = {}
@@ -23,9 +24,10 @@ class Truthful:
         self.time = self.count * self.step
 
     def read(self) -> State:
-        state = self.truth(self.time)
-        assert state is not None
-        return state
+        return self.truth(self.time) or self.start()
+
+    def start(self) -> State:
+        return opening(self.scene).at(0.0)
 
     def close(self) -> None: ...
 
@@ -60,13 +62,13 @@ class Leaning(Truthful):
 
 
 class Trembling(Truthful):
-    """Moves at a step and a half's worth of gravity without getting anywhere."""
+    """Moves at three steps' worth of gravity without getting anywhere."""
 
     def read(self) -> State:
         state = super().read()
         return State(
             state.positions,
-            state.velocities + np.array([0, 0, 1.5 * 9.81 * self.step]),
+            state.velocities + np.array([0, 0, 3 * 9.81 * self.step]),
             state.orientations,
             state.spins,
         )
@@ -76,8 +78,7 @@ class Ghost(Truthful):
     """Nothing stops a ball: the start's straight line."""
 
     def read(self) -> State:
-        start = self.truth(0.0)
-        assert start is not None
+        start = self.start()
         return State(start.positions + start.velocities * self.time, start.velocities)
 
 
@@ -86,14 +87,59 @@ class Slow(Truthful):
 
     def read(self) -> State:
         state = super().read()
-        return State(state.positions, state.velocities * (0.95 if self.count else 1.0))
+        return State(state.positions, state.velocities * (0.95 if self.count else 1.0), state.orientations, state.spins)
 
 
 class Dull(Truthful):
     """Rebounds lose 5 % of the speed."""
 
     def read(self) -> State:
-        state, start = super().read(), self.truth(0.0)
-        assert start is not None
+        state, start = super().read(), self.start()
         turned = (state.velocities * start.velocities).sum(axis=1) < 0
         return State(state.positions, np.where(turned[:, None], 0.95, 1.0) * state.velocities)
+
+
+class Frozen(Truthful):
+    """Nothing moves."""
+
+    def read(self) -> State:
+        start = self.start()
+        return State(start.positions, 0 * start.velocities, start.orientations, start.spins)
+
+
+class Heating(Truthful):
+    """Everything gets 5 % faster after the start and climbs."""
+
+    def read(self) -> State:
+        state, factor = super().read(), 1.05 if self.count else 1.0
+        spins = None if state.spins is None else factor * state.spins
+        climbed = state.positions + self.time * np.array([0, 0, 1])
+        return State(climbed, factor * state.velocities, state.orientations, spins)
+
+
+class Turning(Truthful):
+    """Bodies turn about x at 1 rad/s, whatever their spins say."""
+
+    def read(self) -> State:
+        state = super().read()
+        assert state.orientations is not None
+        turned = turn(np.tile([self.time, 0.0, 0.0], (len(state.positions), 1)), state.orientations)
+        return State(state.positions, state.velocities, turned, state.spins)
+
+
+class Uneven(Truthful):
+    """The later a body is listed, the faster it is, by up to 5 %; those at rest move as well."""
+
+    def read(self) -> State:
+        state = super().read()
+        rows = np.arange(len(state.positions))[:, None] / len(state.positions)
+        moved = state.velocities * (1 + 0.05 * rows) + 0.05 * rows * [0, 0, 1]
+        return State(state.positions, moved if self.count else state.velocities)
+
+
+class Late(Truthful):
+    """Everything happens a quarter later than it should."""
+
+    def advance(self, steps: int) -> None:
+        super().advance(steps)
+        self.time *= 0.8
