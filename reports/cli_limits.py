@@ -32,7 +32,8 @@ def limits(
 ) -> None:
     """Find the height, ratio, speed or step at which each contestant ceases to satisfy the truth of a hard family.
 
-    A sweep shows whether survival is monotone, bisection finds the point. Finished runs are kept in OUT, so that a
+    A sweep shows whether survival is monotone, bisection finds the point. Without --engine, settings that are meant to
+    mend a family are tried too. Finished runs are kept in OUT, so that a
     search that was stopped goes on. Writes OUT/limits.json, and the report where OUT/results.json stands. Exit code 3:
     nothing was measured.
     """
@@ -53,7 +54,8 @@ def limits(
     effort = effort if budget is None else replace(effort, budget=budget)
     try:
         with progress_bar() as progress:
-            part = search.hunt(chosen, contestants, effort, jobs, ProbeStore(folder / "limits.probes.jsonl"), progress)
+            store = ProbeStore(folder / "limits.probes.jsonl")
+            part = search.hunt(chosen, contestants, effort, jobs, store, progress, policies=not engines)
         sections.attach(folder, "limits", part)
     except results.ResultsError as error:
         raise click.UsageError(str(error)) from None

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from impactbench.adapters.contestants import Contestant
+from impactbench.adapters.contestants import Contestant, select
 from impactbench.adapters.isolation import Job, Outcome, run_jobs
 from impactbench.reports.bisect import Range, Search
 from impactbench.reports.cell import record, step_count, step_seconds
@@ -91,13 +91,16 @@ def hunt(
     jobs: int,
     store: ProbeStore,
     progress: Progress = lambda *_: None,
+    policies: bool = False,
 ) -> dict[str, Any]:
-    """The section's part: a search for every family and contestant, each with all its probes."""
+    """The section's part: a search for every family and contestant, each with all its probes; with `policies`, for the
+    settings too that are meant to mend what breaks in a family.
+    """
     hunts = [
         Hunt(family, who, Search(_range(family.knob), effort.sweep, effort.precision))
         for family in chosen
         if family.knob
-        for who in contestants
+        for who in dict.fromkeys((*contestants, *(select(family.policies) if policies and family.policies else ())))
         if not (family.knob.step and who.stepless)
     ]
     for each in hunts:

@@ -17,6 +17,10 @@ def text(part: dict[str, Any]) -> str:
     names = ["hard family", "knob", "truth", *(name.replace("/", " ") for name in part["contestants"])]
     rows = [[row["name"], row["knob"], row["truth"], *(cell["text"] for cell in row["cells"])] for row in shown["rows"]]
     parts = [table(names, rows, right=2), NOTE.format(precision=part["precision"])]
+    if shown["mended"]:
+        head = ["hard family", "settings", "default", "tuned", "with these settings"]
+        lines = [[m["family"], m["policy"], m["default"], m["tuned"], m["point"]] for m in shown["mended"]]
+        parts.append("Settings meant to mend it:\n" + table(head, lines, right=2))
     if shown["odd"]:
         head = ["hard family", "contestant", "first lost at", "why", "survives again at"]
         odd = [[o["family"], o["contestant"], o["fails"], o["why"], o["beyond"]] for o in shown["odd"]]
@@ -52,7 +56,27 @@ def view(part: dict[str, Any]) -> dict[str, Any]:
         for s in part["searches"]
         if not s["monotone"]
     ]
-    return {"contestants": part["contestants"], "rows": rows, "odd": odd, "precision": part["precision"]}
+    return {
+        "contestants": part["contestants"],
+        "rows": rows,
+        "odd": odd,
+        "mended": mended(part, found),
+        "precision": part["precision"],
+    }
+
+
+def mended(part: dict[str, Any], found: dict[tuple[str, str], dict[str, Any]]) -> list[dict[str, str]]:
+    """Breaking points with a family's own settings, beside those of the same engine's profiles."""
+    rows = []
+    for family in part["families"]:
+        name = family["name"]
+        for where, policy in found:
+            if where == name and policy not in part["contestants"]:
+                engine = policy.partition("/")[0]
+                named = {"default": f"{engine}/default", "tuned": f"{engine}/tuned", "point": policy}
+                points = {key: _cell(found.get((name, who)), family)["text"] for key, who in named.items()}
+                rows.append({"family": name, "policy": policy, **points})
+    return rows
 
 
 def _cell(search: dict[str, Any] | None, family: dict[str, Any]) -> dict[str, str]:

@@ -146,6 +146,15 @@ def test_tables_show_every_kind_of_end(part: dict[str, Any]) -> None:
     json.dumps(part, allow_nan=False)
 
 
+def test_settings_of_a_family_stand_beside_the_engines_profiles(part: dict[str, Any]) -> None:
+    """As if the family named one fake's settings, and two others were the same engine's profiles."""
+    names = {"fakes/AlwaysGives": "fakes/default", "fakes/Gives": "fakes/tuned", "fakes/Holds": "fakes/policy"}
+    searches = [{**s, "contestant": names[s["contestant"]]} for s in part["searches"] if s["contestant"] in names]
+    (row,) = view({**part, "contestants": ["fakes/default", "fakes/tuned"], "searches": searches})["mended"]
+    assert (row["policy"], row["default"], row["point"]) == ("fakes/policy", "< 1", ">= 1e+08")
+    assert float(row["tuned"]) <= LIMIT
+
+
 def test_a_budget_that_is_spent_stops_the_bisection_and_says_so(tmp_path: Path) -> None:
     effort = replace(QUICK, budget=1e-9)
     store = ProbeStore(tmp_path / "probes.jsonl")
