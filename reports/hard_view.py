@@ -8,11 +8,22 @@ from typing import Any
 KINDS = {"survived": "met", "failed": "missed"}
 
 
-def cell_text(cell: dict[str, Any]) -> str:
+SHORT = {"survived": "ok", "unsupported": "-", "unavailable": "-"}
+
+
+def short(cell: dict[str, Any]) -> str:
+    """For the terminal: `ok`, the criterion that failed first and when, or the state."""
+    if cell["state"] == "failed":
+        return cell_text(cell, worst=False)
+    return SHORT.get(cell["state"], str(cell["state"]))
+
+
+def cell_text(cell: dict[str, Any], worst: bool = True) -> str:
     """`survived`, the first criterion that failed with its time, or the state."""
     if cell["state"] == "failed":
         first = min((v for v in cell["verdicts"] if v["time"] is not None), key=lambda v: v["time"])
-        return f"{first['criterion']} {first['worst']:.2g} at {first['time']:.3g} s"
+        value = f"{first['worst']:.2g} at " if worst else ""
+        return f"{first['criterion']} {value}{first['time']:.2g} s"
     return str(cell["state"])
 
 
@@ -40,6 +51,11 @@ def counts(document: dict[str, Any]) -> list[tuple[str, Counter[str]]]:
     return list(states.items())
 
 
+NOTE = """\
+ok: survived; a criterion and a time: failed first by it, from then on; -: not run or unsupported (reasons: hard.json).
+After the listed contestants come policies: settings meant to mend what breaks in that family."""
+
+
 def terminal_table(document: dict[str, Any]) -> str:
     """A table a family, failures in words, and a line a contestant at the end."""
     from impactbench.reports.terminal import table
@@ -51,7 +67,7 @@ def terminal_table(document: dict[str, Any]) -> str:
         shown = [
             [
                 row["case"] + (f" {row['step']}" if row["step"] else ""),
-                *(cell_text(c) if c else "-" for c in row["cells"]),
+                *(short(c) if c else "-" for c in row["cells"]),
             ]
             for row in rows
         ]
@@ -60,7 +76,7 @@ def terminal_table(document: dict[str, Any]) -> str:
         [name, str(states["survived"]), str(states["failed"]), others(states)] for name, states in counts(document)
     ]
     parts.append(table(["contestant", "survived", "failed", "other"], totals))
-    return "\n\n".join(parts)
+    return "\n\n".join([NOTE, *parts])
 
 
 def others(states: Counter[str]) -> str:

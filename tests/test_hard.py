@@ -2,12 +2,14 @@
 
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from impactbench.adapters.contestants import Contestant, select
+from impactbench.reports import hard_view, page
 from impactbench.reports.cell import Cell
 from impactbench.reports.geometry import Placed
 from impactbench.reports.hard import LINES, Journal, describe_case, plan, run
@@ -257,3 +259,19 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
     assert {cell["state"] for cell in whole["cells"]} == {"survived"}
     assert len(Journal(lines, json.loads(lines.read_text().splitlines()[0])).cells) == 6
     assert Journal(lines, {"impactbench": "another"}).cells == {}
+
+
+def test_what_readers_see(tmp_path):
+    """Survived, failed with its criterion and time, diverged: told apart in the terminal and on the page."""
+    entries = plan(
+        catalogue.select(["fast_flight[speed=10]"]), [fake(fakes.Truthful), fake(fakes.Slow)], policies=False
+    )
+    document = run(entries, tmp_path, 1, "hard", lambda *_: None)
+    text = hard_view.terminal_table(document)
+    assert re.search(r"fast_flight\[speed=10\]  ok +speed 0.0042 s", text)
+    template = page.environment().get_template("hard.html")
+    html = template.render(view=hard_view.view(json.loads(json.dumps(document))))
+    assert '<td class="met">survived' in html
+    assert '<td class="missed">speed 0.05 at 0.0042 s' in html
+    assert "no force acts: v is constant" in html
+    assert "10 m/s after one step" in html
