@@ -206,12 +206,14 @@ function drawPanel(pen, camera, scene, run, ghost, time, ink, still) {
     trace(pen, camera, pose);
     pen.fillStyle = pose.row < 0 ? ink.ground : ink.fills[level];
     pen.fill();
-    if (ink.hatches[level]) {
+    const reach = pose.body.size[0] * camera.scale, small = reach < 4; // pixels; edges and hatchings would cover it
+    if (ink.hatches[level] && !small) {
       pen.fillStyle = ink.hatches[level];
       pen.fill();
     }
+    if (small && level < 3) continue;
     pen.strokeStyle = ink.line;
-    pen.lineWidth = (level > 3 ? 2.5 : 1.2) * Math.min(1, (pose.body.size[0] * camera.scale) / 8); // thin about small bodies
+    pen.lineWidth = (level > 3 ? 2.5 : 1.2) * Math.min(1, reach / 8);
     pen.stroke();
     if (run.motion.turns && pose.body.kind === "sphere") drawSpoke(pen, camera, pose);
   }
