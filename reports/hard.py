@@ -23,7 +23,7 @@ LINES = "hard.jsonl"
 """Cells of a run that is not complete yet, one a line."""
 Entry = tuple[Cell, Contestant]
 LIMIT, FULL_LIMIT = 300.0, 3600.0
-"""Seconds one cell may take: ten times the slowest healthy one of the default set on an idle core; more with `--full`."""
+"""Seconds one cell may take: ten times the slowest healthy one of the default set; more with `--full`."""
 
 
 def plan(cases: Sequence[Case], contestants: Sequence[Contestant], policies: bool) -> list[Entry]:

@@ -49,7 +49,7 @@ def assess(scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
     """What became of a run, from its trajectory alone."""
     if not trajectory.finite():
         return {"state": "diverged", "reason": first_divergence(trajectory)}
-    if (time := put_back(trajectory)) is not None:
+    if (time := put_back(trajectory, scene.length)) is not None:
         return {"state": "diverged", "reason": f"the whole world jumped back to its start at t = {time:.6g} s"}
     family = HARD[scene.family]
     try:
@@ -71,11 +71,12 @@ def stride(scene: Scene, count: int) -> int:
     return max(1, math.ceil(13 * len(scene.movable) * count / MOST_NUMBERS))
 
 
-def put_back(trajectory: Trajectory) -> float | None:
+def put_back(trajectory: Trajectory, length: float) -> float | None:
     """Time [s] at which all bodies are, to the last bit, where they were at the first or second reading, by a jump.
 
     An engine that resets its world on a bad number leaves no other trace. A periodic motion that returns exactly does
-    so by moving: its last displacement is that of its velocity, which a jump's is not.
+    so by moving: its last displacement is that of its velocity, which a jump's is not. A jump is longer than a
+    thousandth of the scene's `length` [m]: a body that is pushed to and fro by round-off has not been put back.
     """
     x, v, h = trajectory.positions, trajectory.velocities, np.diff(trajectory.times)[0]
     for early in (0, 1):
@@ -83,6 +84,6 @@ def put_back(trajectory: Trajectory) -> float | None:
         for k in np.flatnonzero(same) + 2:
             moved = x[k] - x[k - 1]
             drift = min(np.abs(moved - h * v[k]).max(), np.abs(moved - h * v[k - 1]).max())
-            if drift > 1e-6 * max(float(np.abs(moved).max()), 1e-300) and np.abs(moved).max() > 0:
+            if drift > 1e-3 * length:
                 return float(trajectory.times[k])
     return None

@@ -13,9 +13,10 @@ from impactbench.reports import hard_view, page
 from impactbench.reports.cell import Cell
 from impactbench.reports.geometry import Placed
 from impactbench.reports.hard import LINES, Journal, describe_case, plan, run
-from impactbench.reports.hard_cell import run_hard
+from impactbench.reports.hard_cell import put_back, run_hard
 from impactbench.scenarios import catalogue, hard
 from impactbench.scenarios.catalogue import UnknownCase
+from impactbench.scenarios.trajectory import Trajectory
 
 sys.path.insert(0, str(Path(__file__).parent))  # also what child processes search
 from fakes import hard as fakes
@@ -241,6 +242,14 @@ def test_a_world_put_back_to_its_start_has_diverged():
         "diverged",
         "the whole world jumped back to its start at t = 0.416667 s",
     )
+
+
+def test_round_off_to_and_fro_is_no_jump():
+    """A body that position corrections push by an ulp returns exactly, at rest: that is no reset, a metre is."""
+    times = np.arange(6) / 240
+    for away, found in ((2.0**-52, None), (1.0, times[2])):
+        places = np.array([1.0, 1.0 + away] * 3)[:, None, None] * np.ones(3)
+        assert put_back(Trajectory(times, places, np.zeros((6, 1, 3))), 1.0) == found
 
 
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
