@@ -6,7 +6,7 @@ STAMP := $(VENV)/installed
 # mypy and import-linter do not follow the editable finder; they do follow a folder of links.
 LINKS := $(VENV)/links
 
-.PHONY: compare bench test check format lint types layers tests browsers picture lock clean
+.PHONY: compare bench test check format lint types layers tests browsers picture gallery lock clean
 
 compare: $(STAMP)
 	$(BIN)/impactbench compare --out out $(ARGS)
@@ -53,6 +53,9 @@ browsers:
 picture: out/report.html
 	chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1366,760 --virtual-time-budget=4000 \
 	  --screenshot=docs/report.png file://$(CURDIR)/out/report.html
+
+# One example report from a real run (out/report.html, not kept here: some 3 MB) and the README's picture of it.
+gallery: compare picture
 
 # New versions: needs uv (pip install uv).
 lock:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import axe_core_python
 import pytest
 from browsers import Chrome, Firefox
-from impactbench.reports import page
+from impactbench.reports import diff, diff_page, page, page_scores
+from impactbench.reports.page_data import TARGETS, percent
+from impactbench.reports.page_view import View
 from test_page import HOSTILE, Maker, case, document, small
 
 DRAWN = """(() => {  // scrolls to what is not drawn yet
@@ -65,3 +68,80 @@ def test_hostile_names_stay_text_after_the_script_has_drawn_them(chrome: Chrome,
     assert chrome.js("return document.images.length") == 0
     assert HOSTILE[:12] in chrome.js("return document.querySelector('.live').textContent")
     assert chrome.console() == []
+
+
+def choose(chrome: Chrome, selector: str, field: str, value: float, event: str) -> None:
+    """Set a control as a user would, with its event."""
+    script = "const one = document.querySelector(arguments[0]); one[arguments[1]] = arguments[2];"
+    chrome.js(script + "one.dispatchEvent(new Event(arguments[3], {bubbles: true}));", selector, field, value, event)
+
+
+def test_the_slider_changes_grid_sentence_and_line_as_the_report_would(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page)
+    chrome.until(DRAWN)
+    view = View(small())
+    seen = set()
+    for index, target in enumerate(TARGETS):
+        choose(chrome, "input.target", "value", index, "input")
+        sentences = "[...document.querySelectorAll('.reach')].map(one => [one.dataset.case, one.textContent])"
+        assert dict(chrome.js(f"return {sentences}")) == {n: page_scores.reach(view, n, target) for n in view.cases}
+        seen.add(chrome.js("return document.querySelector('#scores').textContent"))
+        words = "[...document.querySelectorAll('output.target-text')].map(one => one.value)"
+        assert set(chrome.js(f"return {words}")) == {percent(target)}
+    assert len(seen) > 5
+    choose(chrome, "input.target", "value", TARGETS.index(0.1), "input")
+    assert "10 %" in chrome.js("return document.querySelector('.live svg').textContent")
+
+
+def test_another_error_measure_is_drawn_and_tabulated(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page)
+    chrome.until(DRAWN)
+    choose(chrome, "select.measure", "selectedIndex", 1, "change")
+    chrome.until("document.querySelector('[data-measure]')")
+    box = chrome.js("return document.querySelector('[data-measure]').textContent")
+    assert "energy drift (1 = the scene's own scale)" in box
+    assert chrome.js("return document.querySelectorAll('[data-measure] .live').length") == 1
+    # mujoco/tuned's finest drift: 0.5 * 0.08 * 30 / 960
+    rows = "[...document.querySelector('section[data-case=stacked_drop_3] .points table').tBodies[0].rows]"
+    cells = chrome.js(f"return {rows}.map(row => [row.cells[0].textContent, row.cells[2].textContent])")
+    assert ["mujoco/tuned", "0.00125"] in cells
+    assert chrome.console() == []
+
+
+def test_a_deep_link_scrolls_to_its_case(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page, "#scenario=stacked_drop_3")
+    top = "document.querySelector('section[data-case=stacked_drop_3]').getBoundingClientRect().top"
+    chrome.until(f"Math.abs({top}) < 300")
+    assert chrome.js("return scrollY") > 0
+
+
+def test_without_scripts_verdict_tables_and_drawings_are_there(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page, scripts=False)
+    text = chrome.driver.find_element("tag name", "main").text
+    assert "Fails mujoco/tuned gains 86 % of the energy in bounce" in text
+    assert "✓ 0.8 ms" in text
+    assert "To stay below 1 % error" in text
+    drawn = [one for one in chrome.driver.find_elements("css selector", ".chart .static svg") if one.is_displayed()]
+    assert len(drawn) == 2  # error against step is folded away
+    assert not [one for one in chrome.driver.find_elements("css selector", ".control") if one.is_displayed()]
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("kind", ["report", "diff"])
+def test_axe_finds_nothing_serious(kind: str, dark: bool, chrome: Chrome, small_page: Path, tmp_path: Path) -> None:
+    path = small_page
+    if kind == "diff":
+        other = small()
+        other["rows"][0]["value"] *= 2
+        path = tmp_path / "diff.html"
+        diff_page.write_page(diff.compare(small(), other), path)
+    chrome.open(path, dark=dark)
+    chrome.js("document.querySelectorAll('details').forEach(one => one.open = true)")
+    if kind == "report":
+        chrome.until(DRAWN)
+    chrome.js((Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8"))
+    run = "const done = arguments[0]; axe.run().then(done)"
+    found = chrome.driver.execute_async_script(run)
+    assert found["passes"]
+    bad = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
+    assert bad == [], [(one["id"], [node["html"][:200] for node in one["nodes"]][:5]) for one in bad]

@@ -22,6 +22,12 @@ async function draw(box, spec) {
     if (turn !== box.turn) return live.remove(); // another drawing was asked for meanwhile
     // The view's own size would stop the drawing from following the width of the page.
     const svg = live.querySelector("svg");
+    // One picture with a name: the table below holds its marks.
+    for (const part of live.querySelectorAll("[role], [aria-label]")) {
+      for (const name of ["role", "aria-label", "aria-roledescription"]) part.removeAttribute(name);
+    }
+    svg.setAttribute("role", "img");
+    svg.setAttribute("aria-label", box.getAttribute("aria-label") || "chart");
     svg.setAttribute("viewBox", svg.getAttribute("viewBox") || `0 0 ${svg.getAttribute("width")} ${svg.getAttribute("height")}`);
     for (const old of box.querySelectorAll(".static, .live")) if (old !== live) old.remove();
     box.dataset.drawn = "script";
