@@ -113,7 +113,8 @@ def position(s: Setting) -> float:
 
 
 def friction(s: Setting) -> float:
-    return s.scales.fastest * s.step / s.scene.length + s.round_off() + fallen(s) / s.scene.length
+    sunken = len(s.scene.movable) * fallen(s)
+    return (s.scales.fastest * s.step + sunken) / s.scene.length + s.round_off()
 
 
 def heights(s: Setting) -> float:

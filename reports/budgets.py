@@ -197,9 +197,9 @@ CHECKS: tuple[Check, ...] = (
         "1",
         formulas.friction,
         excuses.no_friction,
-        "(v h + g h^2) / L",
+        "(v h + N g h^2) / L",
         "A first-order scheme takes friction a whole step early or late, which displaces by at most v h; distance and "
-        "heading both count, as the error is a vector's.",
+        "heading both count, as the error is a vector's. Each of N bodies may rest one step of falling too low.",
     ),
     Check(
         "spin",

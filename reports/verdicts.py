@@ -128,8 +128,10 @@ def _judge(
     return replace(blank, status="failed", value=counted, reason=f"{check.measure} {value:.3g} exceeds {budget:.3g}")
 
 
-APART = 3
-"""Steps between an impact and the next from which on a contestant must show it as one of its own."""
+APART = 4
+"""Steps between an impact and the next from which on a contestant must show it as one of its own: each may be found one
+late, last two where the pair is taken apart only then, and the measure needs one between them.
+"""
 
 
 def _absent(check: Check, setting: Setting, blank: Verdict, until: float) -> Verdict:
