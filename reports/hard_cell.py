@@ -84,6 +84,6 @@ def put_back(trajectory: Trajectory, length: float) -> float | None:
         for k in np.flatnonzero(same) + 2:
             moved = x[k] - x[k - 1]
             drift = min(np.abs(moved - h * v[k]).max(), np.abs(moved - h * v[k - 1]).max())
-            if drift > 1e-3 * length:
+            if min(drift, np.abs(moved).max()) > 1e-3 * length:
                 return float(trajectory.times[k])
     return None
