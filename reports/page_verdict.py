@@ -102,13 +102,14 @@ def _cheapest(view: View) -> str:
         return ""
     case = view.cases[view.featured]
     found = [(p, r) for p, line in view.of(view.featured).items() if (r := time_to(line, TARGET)) is not None]
-    found.sort(key=lambda item: expense(item[1]))
+    found.sort(key=lambda item: (expense(item[1]), item[0]))
     where = isolated(words(case["family"]))
     if not found:
         return f"Nobody stays below {view.goal(case)} in {where}."
     policy, rung = found[0]
+    what = "cheapest" if rung["timed"] else "coarsest step"
     unit = " ms per simulated second" if rung["timed"] else ""
-    text = f"{isolated(policy)} for {where}: cheapest below {view.goal(case)}, {_cost(rung)}{unit}"
+    text = f"{isolated(policy)} for {where}: {what} below {view.goal(case)}, {_cost(rung)}{unit}"
     engine = next(((p, r) for p, r in found if not p.startswith("reference/")), None)
     if engine is not None and engine[0] != policy:
         text += f"; among engines {isolated(engine[0])}, {_cost(engine[1])}"
