@@ -22,8 +22,8 @@ from impactbench.scenarios.truth import Case
 LINES = "hard.jsonl"
 """Cells of a run that is not complete yet, one a line."""
 Entry = tuple[Cell, Contestant]
-LIMIT, FULL_LIMIT = 300.0, 3600.0
-"""Seconds one cell may take: ten times the slowest healthy one of the default set; more with `--full`."""
+LIMIT, FULL_LIMIT = 120.0, 3600.0
+"""Seconds one cell may take: some five times the slowest healthy one of the default set; more with `--full`."""
 
 
 def plan(cases: Sequence[Case], contestants: Sequence[Contestant], policies: bool) -> list[Entry]:
