@@ -17,7 +17,7 @@ from impactbench.reports.options import contestants_of, progress_bar, writable_f
 @click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out"), show_default=True)
 @click.option("--budget", type=click.FloatRange(0.1), help="Seconds of runs per search. Default: 120, with --full 900.")
-@click.option("--full", is_flag=True, help="A denser sweep, and brackets of 1 % instead of 5 %.")
+@click.option("--full", is_flag=True, help="A denser sweep, and brackets of 1 % instead of 2 %.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=os.cpu_count, help="Runs at once. Default: cores.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def limits(

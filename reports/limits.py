@@ -32,7 +32,7 @@ class Effort:
     """
 
     sweep: int = 9
-    precision: float = 0.05
+    precision: float = 0.02
     budget: float = 120.0
     limit: float = 60.0
 
