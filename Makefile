@@ -36,6 +36,10 @@ layers: $(STAMP)
 tests: $(STAMP)
 	$(BIN)/pytest $(ARGS)
 
+# Seeded faults of laws, adapters and measures: which of them the gate catches. Some minutes.
+mutants: $(STAMP)
+	$(BIN)/python -m tests.mutants $(ARGS)
+
 $(STAMP): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: --require-hashes -r requirements.lock

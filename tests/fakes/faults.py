@@ -68,3 +68,55 @@ class Clockless(Honest):
         if steps > 1:
             os.kill(os.getpid(), signal.SIGSEGV)
         super().advance(steps)
+
+
+class Aborting(Honest):
+    def advance(self, steps: int) -> None:
+        os.abort()
+
+
+class Greedy(Honest):
+    """Asks for a GiB again and again; untouched pages cost nobody anything."""
+
+    def advance(self, steps: int) -> None:
+        self.hoard = [np.zeros(2**27) for _ in range(1000)]
+
+
+class Leaving(Honest):
+    def advance(self, steps: int) -> None:
+        os._exit(0)
+
+
+class Misshapen(Honest):
+    def read(self) -> State:
+        return State(np.zeros((7, 2)), np.zeros((7, 2)))
+
+
+class Empty(Honest):
+    def read(self) -> State:
+        return None  # type: ignore[return-value]
+
+
+class Infinite(Honest):
+    def advance(self, steps: int) -> None:
+        super().advance(steps)
+        self.positions *= 1e200
+
+
+class Refusing(Honest):
+    def __init__(self, *_: object) -> None:
+        from impactbench.scenarios.engine import Unsupported
+
+        raise Unsupported("only Tuesdays")
+
+
+class Interrupting(Honest):
+    def advance(self, steps: int) -> None:
+        raise KeyboardInterrupt
+
+
+class Shouting(Honest):
+    """Many lines of message, as some libraries write them."""
+
+    def advance(self, steps: int) -> None:
+        raise ValueError("first line\nsecond line\nlast line")

@@ -47,7 +47,7 @@ class Reference:
             state = self.engine.read()
             change = state.velocities - self.last.velocities - self.step * self.gravity
             hit = np.linalg.norm(change, axis=1) > 1e-3 * self.scene.speed
-            self.after(state.velocities, change, hit)
+            self.after(state.velocities.copy(), change, hit)
 
     def after(self, velocities: Floats, change: Floats, hit: Floats) -> None:
         """Called after every step; `hit` are the rows whose velocity jumped, `change` by how much."""
@@ -55,9 +55,9 @@ class Reference:
     def push(self, velocities: Floats, positions: Floats | None = None) -> None:
         """Put velocities (and positions) into the engine."""
         rows = list(self.scene.movable)
-        self.engine._bodies.velocity[rows] = velocities
+        self.engine._runner._bodies.velocity[rows] = velocities
         if positions is not None:
-            self.engine._bodies.position[rows] = positions
+            self.engine._runner._bodies.position[rows] = positions
 
     def read(self) -> State:
         return self.seen(self.engine.read())
@@ -166,7 +166,7 @@ class WrongReducedMass(Reference):
 @mutant("impulse along a stale normal, 1e-3 rad off", "impact", "angular-momentum")
 class StaleNormal(Reference):
     def after(self, v, change, hit):
-        x, z = [k for k in range(3) if self.scene.model.dimension == 3 or k in self.scene.model.axes][:2] or (0, 1)
+        x, z = [*self.scene.model.axes, 0, 1][:2]
         turned = np.zeros_like(change)
         turned[:, x], turned[:, z] = -1e-3 * change[:, z], 1e-3 * change[:, x]
         self.push(v + turned * hit[:, None])
@@ -335,7 +335,9 @@ class Limited(Reference):
 class Sleeping(Reference):
     def after(self, v, change, hit):
         slow = np.linalg.norm(v, axis=1) < 0.1
-        self.push(np.where(slow[:, None], 0.0, v), np.where(slow[:, None], self.last.positions, self.engine.read().positions))
+        self.push(
+            np.where(slow[:, None], 0.0, v), np.where(slow[:, None], self.last.positions, self.engine.read().positions)
+        )
 
 
 @mutant("energy put into a body at rest: jitter of 5 mm/s", "energy-gain", "rest-heights")
