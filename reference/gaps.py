@@ -36,6 +36,13 @@ def locate(bodies: Bodies, pairs: Pairs, p: int) -> None:
 
 
 @compiled
+def locate_all(bodies: Bodies, pairs: Pairs) -> None:
+    """Bring all gaps and normals up to date."""
+    for p in range(len(pairs.first)):
+        locate(bodies, pairs, p)
+
+
+@compiled
 def above_plane(point: Floats, normal: Floats, centre: Floats, size: Floats, box: bool) -> Gap:
     """A sphere or box above a half-space: height of the centre less what the body reaches down."""
     gap = 0.0 if box else -size[0]

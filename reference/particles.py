@@ -29,6 +29,8 @@ class Bodies(NamedTuple):
     """Radius in the first column, half extents, or the half-space's normal."""
     debt: Floats
     """Energy [J] that lifts added and no approach has paid back yet."""
+    seen: Floats
+    """Positions at the last look, from which travel is counted."""
 
 
 class Pairs(NamedTuple):
@@ -52,6 +54,10 @@ class Pairs(NamedTuple):
     push: Floats
     """Normal impulse [N s] of the last step, the first guess of the next."""
     rub: Floats
+    clear: Floats
+    """Reading of the odometer up to which the pair surely is apart: two bodies close in by their own travel at most."""
+    odometer: Floats
+    """Twice the largest travel [m] of any body, summed from look to look; one number."""
 
 
 def build_bodies(scene: Scene) -> Bodies:
@@ -68,6 +74,7 @@ def build_bodies(scene: Scene) -> Bodies:
         shape=np.array([_shape(b)[0] for b in bodies], dtype=np.int64),
         size=np.array([_shape(b)[1] for b in bodies], dtype=np.float64).reshape(-1, 3),
         debt=np.zeros(len(bodies)),
+        seen=np.array([b.position for b in bodies], dtype=np.float64).reshape(-1, 3),
     )
 
 
@@ -91,6 +98,8 @@ def build_pairs(scene: Scene) -> Pairs:
         reach=np.zeros(count),
         push=np.zeros(count),
         rub=np.zeros((count, 3)),
+        clear=np.zeros(count),
+        odometer=np.zeros(1),
     )
 
 

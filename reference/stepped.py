@@ -99,12 +99,35 @@ def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
 @compiled
 def detect(bodies: Bodies, pairs: Pairs, touch: float) -> Indices:
     """Numbers of the pairs that touch now."""
+    look(bodies, pairs, touch)
     for p in range(len(pairs.first)):
-        locate(bodies, pairs, p)
         pairs.touching[p] = pairs.gap[p] <= pairs.reach[p] + touch
         if not pairs.touching[p]:
             pairs.reach[p] = 0.0
     return np.nonzero(pairs.touching)[0]
+
+
+@compiled
+def look(bodies: Bodies, pairs: Pairs, touch: float) -> None:
+    """Bring the gaps up to date; of pairs that cannot have met since they were seen apart, to a lower bound above
+    `touch`.
+    """
+    travel = 0.0
+    for i in range(len(bodies.inverse_mass)):
+        x = bodies.position[i, 0] - bodies.seen[i, 0]
+        y = bodies.position[i, 1] - bodies.seen[i, 1]
+        z = bodies.position[i, 2] - bodies.seen[i, 2]
+        travel = max(travel, x * x + y * y + z * z)
+    bodies.seen[:] = bodies.position
+    # Sums of travels lose some of their last digits: a little more keeps the bound sure.
+    pairs.odometer[0] += 2 * math.sqrt(travel) * (1 + 1e-9)
+    now, gap, clear, reach = pairs.odometer[0], pairs.gap, pairs.clear, pairs.reach
+    for p in range(len(gap)):
+        if clear[p] - now > 2 * touch and reach[p] == 0.0:
+            gap[p] = clear[p] - now
+        else:
+            locate(bodies, pairs, p)
+            clear[p] = now + gap[p]
 
 
 @compiled
@@ -134,9 +157,9 @@ def project(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
     more than `SWEEPS` keeps its rest of overlap for the next step.
     """
     for _ in range(len(bodies.inverse_mass)):
+        look(bodies, pairs, rules.touch)
         deepest = 0.0
         for p in range(len(pairs.first)):
-            locate(bodies, pairs, p)
             deepest = max(deepest, -pairs.gap[p])
         if deepest <= rules.touch / 2:
             return

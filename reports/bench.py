@@ -35,6 +35,16 @@ def discs(quick: bool) -> Part:
     return run_race(Race(crowds.gas(1000, 2, 0.2), PLANAR, STEP, *((480, 6) if quick else (2400, 24))))
 
 
+def stack(quick: bool) -> Part:
+    """A column of 10 boxes that falls 1 cm a gap and comes to rest."""
+    return run_race(Race(crowds.column(10), (*SOLID, "pymunk/tuned"), STEP, *((240, 6) if quick else (2400, 24))))
+
+
+def wall(quick: bool) -> Part:
+    """A wall of 10 x 10 bricks in running bond that falls 1 cm a gap and comes to rest."""
+    return run_race(Race(crowds.wall(10, 10), (*SOLID, "pymunk/tuned"), STEP, *((240, 6) if quick else (1200, 24))))
+
+
 def exact(quick: bool) -> Part:
     """Impacts per second of the exact runner, elastic spheres in a box."""
     from impactbench.reference.exact_contestant import Exact
@@ -86,6 +96,13 @@ def growth(quick: bool) -> Part:
     return {"rows": rows, "growth from 1e3 to the largest": rows[-1]["ns per body and step"] / reference}
 
 
+def pairs(quick: bool) -> Part:
+    """Pairs by rule R2 of spheres, half of them static, and what never looking at two statics saves."""
+    from impactbench.reports.bench_pairs import count_pairs
+
+    return count_pairs(200 if quick else 1000, 5 if quick else 15)
+
+
 def startup(quick: bool) -> Part:
     """Start of a process and first step: kernels compiled anew (once per version), and loaded from disk."""
     code = (
@@ -107,6 +124,9 @@ def startup(quick: bool) -> Part:
 BENCHMARKS: dict[str, Callable[[bool], Part]] = {
     "gas": gas,
     "discs": discs,
+    "column": stack,
+    "wall": wall,
+    "pairs": pairs,
     "exact": exact,
     "growth": growth,
     "startup": startup,
