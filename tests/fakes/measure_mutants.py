@@ -37,9 +37,9 @@ CHANGES = {
         'momenta = np.einsum("n,tni->ti", mass * 0 + 1, trajectory.velocities)',
     ),
     "MomentumMean": Change(
-        "momentum: mean in place of the largest", "conservation",
-        "return float(momentum_drifts(scene, law, trajectory, pairs).max())",
-        "return float(momentum_drifts(scene, law, trajectory, pairs).mean())",
+        "momentum and energy gain: mean in place of the largest", "measures",
+        "return Figure(measure, float(series[index]),",
+        "return Figure(measure, float(series.mean()),",
     ),
     "MomentumAlongZ": Change(
         "momentum: norm of one axis", "conservation",
@@ -86,11 +86,13 @@ CHANGES = {
     ),
     "GainSign": Change(
         "energy gain of the wrong sign", "measures",
-        "(matched - np.minimum.accumulate(matched)).max()", "(np.minimum.accumulate(matched) - matched).max()",
+        "(matched - np.minimum.accumulate(matched)) / scene.energy",
+        "(np.minimum.accumulate(matched) - matched) / scene.energy",
     ),
     "GainAtTheEnd": Change(
         "energy gain between start and end only", "measures",
-        "(matched - np.minimum.accumulate(matched)).max()", "max(0.0, matched[-1] - matched[0])",
+        "(matched - np.minimum.accumulate(matched)) / scene.energy",
+        "np.maximum(0.0, matched[-1:] - matched[0]) / scene.energy",
     ),
     "DriftSign": Change(
         "energy drift of the wrong sign", "measures",
@@ -98,11 +100,11 @@ CHANGES = {
     ),
     "DepthSign": Change(
         "penetration: gap counted as depth", "measures",
-        "np.maximum(-np.min([", "np.maximum(np.min([",
+        "np.maximum(-gaps.min(axis=0), 0.0)", "np.maximum(gaps.min(axis=0), 0.0)",
     ),
     "DepthMean": Change(
         "penetration: mean in place of the deepest", "measures",
-        'Figure("penetration_max", float(depth.max()))', 'Figure("penetration_max", float(depth.mean()))',
+        'Figure("penetration_max", float(depth[deepest]),', 'Figure("penetration_max", float(depth.mean()),',
     ),
     "LastPairIgnored": Change(
         "penetration: the last pair ignored", "measures",
