@@ -11,9 +11,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
+from impactbench.adapters import policies
 from impactbench.scenarios.engine import Engine, Unavailable
 from impactbench.scenarios.records import Law
 
@@ -30,10 +32,11 @@ class Contestant:
     distribution: str = ""  # the installed package that carries it; none for a user's own engine
     law: Law = "nc"
     stepless: bool = False  # goes from event to event: a step is only how often it is read
+    options: policies.Options = ()  # solver settings on top of the profile
 
     @property
     def name(self) -> str:
-        return f"{self.engine}/{self.profile}"
+        return f"{self.engine}/{self.profile}{policies.suffix(self.options)}"
 
     @property
     def lane(self) -> str:
@@ -56,9 +59,17 @@ class Contestant:
         module, _, name = self.factory.rpartition(":")
         try:
             found = _import_file(Path(module)) if module.endswith(".py") else importlib.import_module(module)
-            return cast(type[Engine], getattr(found, name))
+            kind = getattr(found, name)
+            return cast(type[Engine], partial(_configured, kind, dict(self.options)) if self.options else kind)
         except (ImportError, OSError, AttributeError) as fault:  # OSError: a shared library that does not load
             raise Unavailable(self.availability() or f"{self.name} cannot be loaded: {fault}") from fault
+
+
+def _configured(kind: Any, options: dict[str, policies.Value], *scene_and_step: Any) -> Engine:
+    """A world of this kind with solver settings changed once it is built."""
+    engine: Any = kind(*scene_and_step)
+    engine.configure(options)
+    return cast(Engine, engine)
 
 
 CONTESTANTS = (
@@ -78,19 +89,36 @@ def _policy(engine: str, profile: str) -> Contestant:
     return replace(next(known for known in CONTESTANTS if known.engine == engine), profile=profile)
 
 
-POLICIES = tuple(
+_PROFILES = tuple(
     _policy(engine, profile)
     for engine, profile in (
         ("pybullet", "iterations"),
         ("pybullet", "swept"),
+        ("pybullet", "maximal"),
+        ("pybullet", "multibody"),
         ("mujoco", "stiff"),
         ("mujoco", "cushion"),
         ("mujoco", "speculative"),
+        ("mujoco", "implicit"),
+        ("mujoco", "implicitfast"),
+        ("mujoco", "rk4"),
         ("pymunk", "iterations"),
         ("pymunk", "substeps"),
     )
 )
-"""Settings that mend one kind of hard case and take part only when named in full; each adapter says what it sets."""
+
+
+def _with_options(text: str) -> Contestant:
+    """The contestant that a name with settings means. Raises UnknownContestant in one line."""
+    try:
+        base, options = policies.parse(text)
+    except ValueError as error:
+        raise UnknownContestant(str(error)) from None
+    return replace(next(known for known in (*CONTESTANTS, *_PROFILES) if known.name == base), options=options)
+
+
+POLICIES = (*_PROFILES, *(_with_options(name) for name in policies.option_policies()))
+"""Further settings, which take part when named in full or with `--profile all`; `policies.SOURCES` says whence."""
 
 GROUP = "impactbench.engines"
 """Entry points of this group are engines that other installed packages offer."""
@@ -113,9 +141,11 @@ def select(engines: Sequence[str] = (), profiles: Sequence[str] = ()) -> tuple[C
 
     `engines` holds engines ("mujoco"), contestants ("mujoco/tuned"), globs of either, or a user's own engine
     ("file.py:Name", "module:Name"), which becomes `Name/default`, or the name of an installed one (see `installed`);
-    these pass whatever the profiles, and only when asked for.
+    these pass whatever the profiles, and only when asked for. So do contestants with settings
+    ("mujoco/tuned:iterations=20"), and those of a file ("policies.toml").
     """
-    own = [_own(text) for text in engines if ":" in text]
+    engines = [name for text in engines for name in (_of_file(text) if text.endswith(".toml") else [text])]
+    own = [_with_options(text) if policies.is_policy(text) else _own(text) for text in engines if ":" in text]
     filters = [text for text in engines if ":" not in text]
     for text in filters:
         if any(_matches(contestant, text) for contestant in CONTESTANTS):
@@ -136,6 +166,21 @@ def select(engines: Sequence[str] = (), profiles: Sequence[str] = ()) -> tuple[C
     if not chosen and not own:
         raise UnknownContestant(f"no contestant is both {' or '.join(engines)} and {' or '.join(profiles)}")
     return _without_doubles([*chosen, *own])
+
+
+def with_policies(engines: Sequence[str] = ()) -> tuple[Contestant, ...]:
+    """What `select` gives, and every policy of the table of the engines asked for."""
+    chosen = select(engines)
+    whole = {text for text in engines if "/" not in text and ":" not in text}
+    more = [policy for policy in POLICIES if not engines or any(_matches(policy, text) for text in whole)]
+    return _without_doubles([*chosen, *more])
+
+
+def _of_file(text: str) -> list[str]:
+    try:
+        return policies.read(Path(text))
+    except ValueError as error:
+        raise UnknownContestant(str(error)) from None
 
 
 def _matches(contestant: Contestant, text: str) -> bool:

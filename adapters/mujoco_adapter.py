@@ -50,6 +50,13 @@ STIFF, CUSHION = "{!r} 1", "{!r} {!r}"
 takes back a fiftieth of an overlap per step while the damper stops the approach in one."""
 RIGID = "0.9999 0.9999 0.001 0.5 2"
 """solimp: constant impedance, or e would depend on depth."""
+WORDS = {
+    "integrator": (mj.mjtIntegrator, "mjINT_"),
+    "cone": (mj.mjtCone, "mjCONE_"),
+    "solver": (mj.mjtSolver, "mjSOL_"),
+    "jacobian": (mj.mjtJacobian, "mjJAC_"),
+}
+"""Options whose values have names."""
 LOST = tuple(int(w) for w in (mj.mjtWarning.mjWARN_BADQPOS, mj.mjtWarning.mjWARN_BADQVEL, mj.mjtWarning.mjWARN_BADQACC))
 FULL_BUFFERS = tuple(int(w) for w in (mj.mjtWarning.mjWARN_CONTACTFULL, mj.mjtWarning.mjWARN_CNSTRFULL))
 
@@ -79,6 +86,13 @@ class MuJoCo:
     @property
     def settings(self) -> Mapping[str, object]:
         return self._settings
+
+    def configure(self, settings: Mapping[str, object]) -> None:
+        """Options of the solver by their own names, on top of the profile's."""
+        for name, value in settings.items():
+            kind, prefix = WORDS.get(name, (None, ""))
+            setattr(self._m.opt, name, value if kind is None else int(getattr(kind, prefix + str(value).upper())))
+        self._settings |= settings
 
     def advance(self, steps: int) -> None:
         mj.mj_step(self._m, self._d, steps)

@@ -71,7 +71,7 @@ class Bullet:
         bounce = surface_factors(scene, pairs, lambda c: c.bounciness, 1.0)
         rough = surface_factors(scene, pairs, lambda c: c.friction if model.friction and not self._rates else 0.0)
         self._c = c = _client()
-        self._rotation = model.rotation
+        self._rotation, self._spent = model.rotation, False
         self._published = PUBLISHED.get(profile)
         self._tuned = profile in ("tuned", "swept") or self._published is not None
         self._swept, self._iterations = profile == "swept", profile == "iterations"
@@ -103,6 +103,12 @@ class Bullet:
     def settings(self) -> Mapping[str, object]:
         return self._settings
 
+    def configure(self, settings: Mapping[str, object]) -> None:
+        """Parameters of the solver by their own names, on top of the profile's."""
+        pb.setPhysicsEngineParameter(**settings, physicsClientId=self._c)
+        self._settings |= settings
+        self._spent = True
+
     def advance(self, steps: int) -> None:
         step, client = pb.stepSimulation, self._c
         for _ in range(steps):
@@ -119,7 +125,9 @@ class Bullet:
         return State(x, v, q, np.array([m[1] for m in motions], dtype=float).reshape(-1, 3))
 
     def close(self) -> None:
-        if pb.isConnected(self._c):
+        if self._spent:  # a reset keeps numSubSteps: the next world would inherit it
+            pb.disconnect(self._c)
+        elif pb.isConnected(self._c):
             pb.resetSimulation(self._c)
 
     def _coordinates(self, scene: Scene, model: Model, pairs: list[tuple[int, int]]) -> tuple[bool, bool]:

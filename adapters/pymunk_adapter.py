@@ -85,6 +85,12 @@ class Pymunk:
     def settings(self) -> Mapping[str, object]:
         return self._settings
 
+    def configure(self, settings: Mapping[str, object]) -> None:
+        """Attributes of the space by their own names, on top of the profile's."""
+        for name, value in settings.items():
+            setattr(self._space, name, value)
+        self._settings |= settings
+
     def advance(self, steps: int) -> None:
         step, h = self._space.step, self._step
         for _ in range(steps * self._parts):

@@ -27,7 +27,12 @@ NOTHING_MEASURED = 3
 STEP_HELP = "Step [s], 1/240 or 0.004. Repeatable. Default: 1/30 ... 1/960."
 PHASES_HELP = "Impact phases tried per step in the cases that are timed; the worst one counts."
 TIMING_HELP = "Time a case of each of six families, every case, or none."
-ENGINE_HELP = "An engine (mujoco), a contestant (mujoco/tuned), a glob, or FILE.py:Class for your own. Repeatable."
+ENGINE_HELP = (
+    "An engine (mujoco), a contestant (mujoco/tuned), one with settings (mujoco/tuned:iterations=20), a glob, a file "
+    "of policies (FILE.toml), or FILE.py:Class for your own. Repeatable."
+)
+PROFILES = ["default", "tuned", "both", "all"]
+PROFILE_HELP = "`all` adds every policy of `list engines`."
 
 
 @click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -41,7 +46,7 @@ def main() -> None:
 @main.command()
 @click.argument("cases", nargs=-1, metavar="[CASE ...]")
 @click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
-@click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
+@click.option("--profile", type=click.Choice(PROFILES), default="both", show_default=True, help=PROFILE_HELP)
 @click.option("--law", type=click.Choice(["doc", "nc"]), help="Law of the reference; engines realise nc. Default: doc.")
 @click.option("--step", "steps", multiple=True, callback=steps_of, help=STEP_HELP)
 @click.option("--model", type=click.Choice(["minimal", "full", "both"]), default="minimal", show_default=True)
@@ -156,7 +161,7 @@ def run(
 @click.argument("case")
 @click.option("--error", "text", default="1%", show_default=True, help="Largest error allowed: 1% or 0.01.")
 @click.option("--engine", "engines", multiple=True, help=ENGINE_HELP)
-@click.option("--profile", type=click.Choice(["default", "tuned", "both"]), default="both", show_default=True)
+@click.option("--profile", type=click.Choice(PROFILES), default="both", show_default=True, help=PROFILE_HELP)
 @click.option("--step", "steps", multiple=True, callback=steps_of, help=STEP_HELP)
 @click.option(
     "--phases", type=click.IntRange(1, 64), default=8, show_default=True, help="Impact phases tried per step."

@@ -303,6 +303,6 @@ def provenance(command: str, contestants: Iterable[Contestant], load: float) -> 
         "versions": {c.engine: c.version() for c in contestants} | {"numpy": metadata.version("numpy")},
         "load": load,
         "clock_seconds": machine.clock_seconds(),
-        "engines": {c.name: c.factory for c in contestants if c not in CONTESTANTS},
+        "engines": {c.name: c.factory for c in contestants if c.factory not in {k.factory for k in CONTESTANTS}},
         "notes": [f"the machine was busy when this began (load {load:.1f}): times may be too long"] if busy else [],
     }

@@ -188,6 +188,6 @@ def command_for(selection: Selection, verdict: Verdict, until: float = math.inf)
 
 def selector(contestant: Contestant) -> str:
     """What names the contestant on a command line: its name, or where a user's own engine was loaded from."""
-    if contestant in (*CONTESTANTS, *installed()):
+    if contestant.factory in {known.factory for known in (*CONTESTANTS, *installed())}:
         return contestant.name
     return contestant.factory

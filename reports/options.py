@@ -52,8 +52,10 @@ def contestants_of(engines: Sequence[str], profile: str) -> Sequence[Contestant]
     """An engine named with its profile needs no `--profile`; the reference's own always pass."""
     from impactbench.adapters import contestants
 
-    whole = [name for name in engines if "/" in name]
+    whole = [name for name in engines if "/" in name or name.endswith(".toml")]
     try:
+        if profile == "all":
+            return contestants.with_policies(engines)
         if whole and len(whole) == len(engines):
             return contestants.select(engines)
         return contestants.select(engines, () if profile == "both" else (profile, "stepped", "exact"))

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from impactbench.adapters import contestants
+from impactbench.adapters import contestants, policies
 from impactbench.scenarios.catalogue import FAMILIES
 from impactbench.scenarios.hard import HARD
 from rich.console import Console
@@ -101,12 +101,19 @@ def hard_table() -> str:
 
 
 def engine_table() -> str:
+    """Contestants, policies that take part when named, and the settings that make further ones."""
     rows = []
-    for contestant in contestants.CONTESTANTS:
-        why = contestant.availability()
-        rows.append([contestant.name, contestant.version() or "-", why or "available"])
-    rows += [[own.name, own.version() or "-", contestants.HINT] for own in contestants.installed()]
-    return table(["contestant", "version", "here"], rows)
+    for contestant in (*contestants.CONTESTANTS, *contestants.POLICIES):
+        here = contestant.availability() or "available"
+        by_name = here if contestant in contestants.CONTESTANTS else f"{here}, by name"
+        rows.append([contestant.name, contestant.version() or "-", by_name, policies.SOURCES[contestant.name]])
+    rows += [[own.name, own.version() or "-", contestants.HINT, "-"] for own in contestants.installed()]
+    settings = [[e, s.name, s.allowed, s.source] for e, all_of in policies.SETTINGS.items() for s in all_of]
+    return (
+        table(["contestant", "version", "here", "source"], rows)
+        + "\n\nSettings for further policies, as in --engine mujoco/tuned:iterations=20,cone=pyramidal\n\n"
+        + table(["engine", "setting", "takes", "source"], settings)
+    )
 
 
 def pair_law_table(laws: Iterable[Sequence[str]]) -> str:
