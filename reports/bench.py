@@ -100,7 +100,7 @@ def pairs(quick: bool) -> Part:
     """Pairs by rule R2 of spheres, half of them static, and what never looking at two statics saves."""
     from impactbench.reports.bench_pairs import count_pairs
 
-    return count_pairs(200 if quick else 1000, 5 if quick else 15)
+    return count_pairs(200 if quick else 1000, 15)
 
 
 def startup(quick: bool) -> Part:
