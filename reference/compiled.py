@@ -31,9 +31,20 @@ STORE = _store()
 
 def compiled(kernel: Kernel) -> Kernel:
     """Compile for numbers and flat arrays at the first call, or load what an earlier process compiled."""
+    return _compile(kernel)
+
+
+def inlined(kernel: Kernel) -> Kernel:
+    """Like `compiled`, set into its callers and without counting references: handing on dozens of arrays and counting
+    each costs several times the arithmetic of a small kernel. It cannot make arrays; those it gets are its callers'.
+    """
+    return _compile(kernel, forceinline=True, _nrt=False)
+
+
+def _compile(kernel: Kernel, **options: bool) -> Kernel:
     usual = config.CACHE_DIR
     config.CACHE_DIR = str(STORE)  # read once, by the next line; other users of numba keep their own
     try:
-        return cast(Kernel, njit(cache=True)(kernel))
+        return cast(Kernel, njit(cache=True, error_model="numpy", **options)(kernel))
     finally:
         config.CACHE_DIR = usual

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from impactbench.reference.compiled import compiled
+from impactbench.reference.compiled import inlined
 from impactbench.reference.particles import Indices
 from impactbench.scenarios.trajectory import Floats
 
@@ -42,7 +42,7 @@ def build_cells(position: Floats, radius: Floats, axes: tuple[int, ...]) -> Cell
     if bodies > FEW:
         spread = np.ptp(position, axis=0) + 2 * radius.max()
         room = float(np.prod(spread[list(axes)]))
-        side = max(2 * float(radius.max()) * (1 + 1e-9), (room / bodies) ** (1 / len(axes)))
+        side = max(2 * float(radius.max()) * (1 + 1e-9), (room / (4 * bodies)) ** (1 / len(axes)))
         wanted = np.floor(spread / side).astype(np.int64)
         count = np.array([wanted[k] if k in axes and wanted[k] >= 3 else 1 for k in range(3)], dtype=np.int64)
     cells = Cells(
@@ -58,13 +58,13 @@ def build_cells(position: Floats, radius: Floats, axes: tuple[int, ...]) -> Cell
     return cells
 
 
-@compiled
+@inlined
 def cell_of(n: Indices, x: int, y: int, z: int) -> int:
     """Number of a cube's cell, counted modulo the numbers of cells n along each axis."""
     return int((x % n[0] * n[1] + y % n[1]) * n[2] + z % n[2])
 
 
-@compiled
+@inlined
 def enter(cells: Cells, body: int) -> None:
     cell = cell_of(cells.number, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])
     first = cells.head[cell]
@@ -74,7 +74,7 @@ def enter(cells: Cells, body: int) -> None:
     cells.head[cell] = body
 
 
-@compiled
+@inlined
 def leave(cells: Cells, body: int) -> None:
     after, before = cells.after[body], cells.before[body]
     if after != EMPTY:
@@ -85,7 +85,7 @@ def leave(cells: Cells, body: int) -> None:
         cells.head[cell_of(cells.number, cells.cube[body, 0], cells.cube[body, 1], cells.cube[body, 2])] = after
 
 
-@compiled
+@inlined
 def cross(cells: Cells, body: int, side: int) -> None:
     """Move a body to the next cell. side: 2 axis for the lower, 2 axis + 1 for the upper neighbour."""
     leave(cells, body)

@@ -1,7 +1,8 @@
-"""Priority queue of the bodies by the time of their own next event: a binary heap that knows where each body sits.
+"""Priority queue of the bodies by the time of their own next event: a knock-out tournament among neighbours (Marin,
+Risso & Cordero 1993, J. Comput. Phys. 109, 306).
 
-Every body holds one event, its earliest (Lubachevsky 1991), so the heap never grows and changes in O(log n). Equal
-times are taken by the lower body number.
+Every body holds one event, its earliest (Lubachevsky 1991), so the tree never grows. A changed time is played up the
+tree until it no longer decides a match. Equal times are taken by the lower body number.
 """
 
 from __future__ import annotations
@@ -9,59 +10,45 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from impactbench.reference.compiled import compiled
+from impactbench.reference.compiled import inlined
 from impactbench.reference.particles import Indices
 from impactbench.scenarios.trajectory import Floats
 
 
 class Queue(NamedTuple):
-    """due [s] per body; heap: body at each place; place: where each body sits. Shapes [n]."""
+    """due [s] per body, infinite for places without one, shape [p], p a power of two; winner: body with the earliest
+    event below each node, shape [2 p]: the root is 1, the children of k are 2 k and 2 k + 1, the leaves begin at p.
+    """
 
     due: Floats
-    heap: Indices
-    place: Indices
+    winner: Indices
 
 
 def build_queue(count: int) -> Queue:
-    return Queue(np.full(count, np.inf), np.arange(count, dtype=np.int64), np.arange(count, dtype=np.int64))
+    places = 1 << max(1, (count - 1).bit_length())
+    winner = np.zeros(2 * places, dtype=np.int64)
+    winner[places:] = np.arange(places)
+    for node in range(places - 1, 0, -1):
+        winner[node] = winner[2 * node]
+    return Queue(np.full(places, np.inf), winner)
 
 
-@compiled
+@inlined
+def earliest(queue: Queue) -> int:
+    """The body whose event comes first."""
+    return int(queue.winner[1])
+
+
+@inlined
 def reschedule(queue: Queue, body: int, due: float) -> None:
-    """Give a body's event another time and bring the heap in order."""
-    queue.due[body] = due
-    place = rise(queue, body, queue.place[body])
-    sink(queue, body, place)
-
-
-@compiled
-def sooner(queue: Queue, a: int, b: int) -> bool:
-    return bool(queue.due[a] < queue.due[b] or (queue.due[a] == queue.due[b] and a < b))
-
-
-@compiled
-def rise(queue: Queue, body: int, place: int) -> int:
-    while place > 0:
-        above = (place - 1) // 2
-        other = queue.heap[above]
-        if not sooner(queue, body, other):
-            break
-        queue.heap[place], queue.place[other] = other, place
-        place = above
-    queue.heap[place], queue.place[body] = body, place
-    return place
-
-
-@compiled
-def sink(queue: Queue, body: int, place: int) -> None:
-    count = len(queue.heap)
-    while 2 * place + 1 < count:
-        below = 2 * place + 1
-        if below + 1 < count and sooner(queue, queue.heap[below + 1], queue.heap[below]):
-            below += 1
-        other = queue.heap[below]
-        if not sooner(queue, other, body):
-            break
-        queue.heap[place], queue.place[other] = other, place
-        place = below
-    queue.heap[place], queue.place[body] = body, place
+    """Give a body's event another time and play its matches again."""
+    times, winner = queue.due, queue.winner
+    times[body] = due
+    node = (len(times) + body) // 2
+    while node > 0:
+        left, right = winner[2 * node], winner[2 * node + 1]
+        best = right if times[right] < times[left] else left
+        if best == winner[node] and best != body:
+            return
+        winner[node] = best
+        node //= 2

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from impactbench.reference.compiled import compiled
+from impactbench.reference.compiled import compiled, inlined
 
 GRAZING = 1e-18
 """Square of the sine of a grazing approach that is let pass: the overlap it can lead to is below 1e-18 of the
@@ -18,7 +18,7 @@ distance."""
 HALVINGS = 200
 
 
-@compiled
+@inlined
 def meet(x: float, y: float, z: float, u: float, v: float, w: float, reach: float) -> float:
     """Smaller root of |d + u t| = reach with d = (x, y, z) [m] and relative velocity (u, v, w) [m/s].
 
@@ -36,7 +36,7 @@ def meet(x: float, y: float, z: float, u: float, v: float, w: float, reach: floa
     return c / (-b + math.sqrt(inside)) if c > 0.0 else 0.0
 
 
-@compiled
+@inlined
 def land(gap: float, speed: float, pull: float) -> float:
     """Time at which gap + speed t + pull t^2/2 falls through 0, in the form that does not cancel.
 

@@ -10,10 +10,10 @@ independent impacts do not, so only those are as symmetric as the scene.
 
 from __future__ import annotations
 
-from impactbench.reference.compiled import compiled
-from impactbench.reference.events_cells import cross
+from impactbench.reference.compiled import compiled, inlined
+from impactbench.reference.events_queue import earliest
 from impactbench.reference.exact_impact import settle, strike_sphere, strike_wall
-from impactbench.reference.exact_predict import CELL, EDGE, SPHERE, fly, predict
+from impactbench.reference.exact_predict import EDGE, SPHERE, enter_cell, fly, predict
 from impactbench.reference.exact_world import World
 
 REACHED, TOO_MANY, CROWDED, AT_EDGE = 0, 1, 2, 3
@@ -46,27 +46,26 @@ def run(world: World, until: float, most: int) -> tuple[int, float]:
     """Process all events up to and at `until` [s], at most `most`. Returns how it ended, and the time of the end."""
     queue = world.queue
     for _ in range(most):
-        i = queue.heap[0]
+        i = earliest(queue)
         now = queue.due[i]
         if not now <= until:
             return REACHED, until
         outcome = process(world, i, now)
         if outcome != REACHED:
             return outcome, now
-    return TOO_MANY, queue.due[queue.heap[0]]
+    return TOO_MANY, queue.due[earliest(queue)]
 
 
-@compiled
+@inlined
 def process(world: World, i: int, now: float) -> int:
     """One event of sphere i."""
     s = world.spheres
+    if s.leaves[i]:
+        enter_cell(world, i, now)
+        return REACHED
     kind, partner = s.kind[i], s.partner[i]
     if kind == EDGE:
         return AT_EDGE
-    if kind == CELL:
-        cross(world.cells, i, partner)
-        predict(world, i, now)
-        return REACHED
     if kind == SPHERE:
         if s.partner_events[i] != s.events[partner]:
             predict(world, i, now)
@@ -87,7 +86,7 @@ def process(world: World, i: int, now: float) -> int:
     return CROWDED if crowded else REACHED
 
 
-@compiled
+@inlined
 def count_event(world: World, i: int, now: float) -> bool:
     """Bring sphere i to its event and count it. True if its events no longer get on in time."""
     s = world.spheres

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from impactbench.reference.exact import AT_EDGE, CROWDED, REACHED, begin, run
 from impactbench.reference.exact_checks import check_scene
-from impactbench.reference.exact_world import build_world
+from impactbench.reference.exact_world import World, build_world
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
@@ -33,6 +33,8 @@ class Exact:
         self._name, self._step, self._done = scene.name, float(step), 0
         self._world = build_world(scene, law, model)
         rules = self._world.rules
+        if may_stop(self._world):
+            self._try(scene, law, model)
         self.settings = {
             "law": law,
             "method": "event-driven, closed-form contact times",
@@ -51,7 +53,16 @@ class Exact:
 
     def advance(self, steps: int) -> None:
         self._done += steps
-        outcome, time = run(self._world, self._done * self._step, MOST_EVENTS)
+        self._run(self._world, self._done * self._step)
+
+    def _try(self, scene: Scene, law: Law, model: Model) -> None:
+        """Run ahead to the scene's end, so that a scene that cannot be done is refused before it begins."""
+        trial = build_world(scene, law, model)
+        begin(trial)
+        self._run(trial, scene.duration)
+
+    def _run(self, world: World, until: float) -> None:
+        outcome, time = run(world, until, MOST_EVENTS)
         if outcome == REACHED:
             return
         where = f"{self._name}: t = {time:.9g} s"
@@ -70,3 +81,9 @@ class Exact:
 
     def close(self) -> None:
         """Nothing is held outside Python's memory."""
+
+
+def may_stop(world: World) -> bool:
+    """Whether spheres could come to lie on one another or to an edge, where this runner ends."""
+    many, elastic = len(world.spheres.radius) > 1, bool((world.rules.bounciness == 1.0).all())
+    return bool(world.walls.bounded.any()) or (many and (world.rules.pulled or not elastic))

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from impactbench.reference.compiled import compiled
+from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.exact_world import World
 
 SWEEPS = 1000
 
 
-@compiled
+@inlined
 def strike_sphere(world: World, i: int, k: int) -> bool:
     """Impact of two spheres: u' = b (u - 2 (u . n) n) (documents, rule R9) or u' = u - (1 + e) (u . n) n (Newton).
 
@@ -44,7 +44,7 @@ def strike_sphere(world: World, i: int, k: int) -> bool:
     return bool(pull < 0.0 and -b * along * math.sqrt(square) <= world.rules.rest)
 
 
-@compiled
+@inlined
 def strike_wall(world: World, i: int, w: int) -> None:
     """One-way impact: v' = b (v - 2 (v . n) n) (documents, rule R13) or v' = v - (1 + e) (v . n) n (Newton).
 
@@ -69,25 +69,26 @@ def strike_wall(world: World, i: int, w: int) -> None:
             v[k] += b * along * n[k]
 
 
-@compiled
+@inlined
 def settle(world: World, i: int) -> None:
     """After a change of velocity: which walls the sphere still rests on, and the acceleration they leave it.
 
     A wall only pushes: a = g + sum of p_w n_w with p_w >= 0 and a . n_w >= 0, by sweeps over the walls it rests on.
     """
     s, walls, rules = world.spheres, world.walls, world.rules
-    v, a = s.velocity[i], s.acceleration[i]
     resting = False
     for w in range(len(walls.level)):
         if s.rests[i, w]:
-            n = walls.normal[w]
-            along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+            along = 0.0
+            for k in range(3):
+                along += s.velocity[i, k] * walls.normal[w, k]
             s.rests[i, w] = abs(along) <= rules.rest
             resting |= s.rests[i, w]
             if s.rests[i, w]:
                 for k in range(3):
-                    v[k] -= along * n[k]
-    a[:] = rules.gravity
+                    s.velocity[i, k] -= along * walls.normal[w, k]
+    for k in range(3):
+        s.acceleration[i, k] = rules.gravity[k]
     if resting:
         press(world, i)
 
@@ -95,7 +96,8 @@ def settle(world: World, i: int) -> None:
 @compiled
 def press(world: World, i: int) -> None:
     s, walls = world.spheres, world.walls
-    a, push = s.acceleration[i], np.zeros(len(walls.level))
+    a, push = s.acceleration[i], walls.push
+    push[:] = 0.0
     small = 1e-15 * math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     for _ in range(SWEEPS):
         worst = 0.0

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 
-from impactbench.reference.compiled import compiled
-from impactbench.reference.events_cells import EMPTY, cell_of
+from impactbench.reference.compiled import compiled, inlined
+from impactbench.reference.events_cells import EMPTY, Cells, cross
 from impactbench.reference.events_queue import reschedule
 from impactbench.reference.events_roots import curve, fall_back, land, meet
-from impactbench.reference.exact_world import World
+from impactbench.reference.exact_world import Spheres, World
 from impactbench.scenarios.trajectory import Floats
 
-NOTHING, SPHERE, WALL, CELL, EDGE = 0, 1, 2, 3, 4
-"""Kinds of events. EDGE: the sphere comes to an edge of a box, which this runner does not resolve."""
+NOTHING, SPHERE, WALL, EDGE = 0, 1, 2, 3
+"""Kinds of contacts. EDGE: the sphere comes to an edge of a box, which this runner does not resolve."""
+
+NO_SIDE = -1
 
 GRAIN = 1e-15
 """Gap, next to the coordinates it is the difference of, that counts as closed."""
 
 
-@compiled
+@inlined
 def fly(world: World, i: int, now: float) -> None:
     """Bring a sphere to `now` [s] on its parabola."""
     s = world.spheres
@@ -29,53 +31,72 @@ def fly(world: World, i: int, now: float) -> None:
     s.time[i] = now
 
 
-@compiled
+@inlined
 def predict(world: World, i: int, now: float) -> None:
     """Bring sphere i to `now` [s] on its parabola, then find and queue its next event."""
     s = world.spheres
     fly(world, i, now)
     s.kind[i] = NOTHING
-    due = cell_exit(world, i, now)
+    due = math.inf
     if world.rules.collide:
         due = first_wall(world, i, now, due)
-        due = first_sphere(world, i, now, due)
-    reschedule(world.queue, i, due)
+        due = first_sphere(s, world.cells, world.rules.pulled, i, now, due, NO_SIDE)
+    s.contact[i] = due
+    queue_next(world, i, now)
 
 
-@compiled
-def cell_exit(world: World, i: int, now: float) -> float:
-    s, cells, due = world.spheres, world.cells, math.inf
+@inlined
+def enter_cell(world: World, i: int, now: float) -> None:
+    """Sphere i has come to the next cell at `now` [s]: only the cells that are new to it can hold an earlier contact."""
+    s = world.spheres
+    fly(world, i, now)
+    cross(world.cells, i, s.exit_side[i])
+    if world.rules.collide:
+        s.contact[i] = first_sphere(s, world.cells, world.rules.pulled, i, now, s.contact[i], s.exit_side[i])
+    queue_next(world, i, now)
+
+
+@inlined
+def queue_next(world: World, i: int, now: float) -> None:
+    """Queue the sphere's contact, or its way out of the cell if that comes first."""
+    s, cells, out = world.spheres, world.cells, math.inf
+    side = cells.side[0]
     for k in range(3):
         if cells.number[k] > 1:
-            at, speed, pull = s.position[i, k], s.velocity[i, k], s.acceleration[i, k]
-            low = cells.cube[i, k] * cells.side[0]
-            for side in range(2):
-                gap = low + cells.side[0] - at if side == 1 else at - low
-                sign = -1.0 if side == 1 else 1.0
-                time = now + land(gap, sign * speed, sign * pull)
-                if time < due:
-                    due, s.kind[i], s.partner[i] = time, CELL, 2 * k + side
-    return due
+            speed, pull = s.motion[i, 3 + k], s.acceleration[i, k]
+            above = s.motion[i, k] - cells.cube[i, k] * side
+            if speed < 0.0 or pull < 0.0:
+                time = now + land(above, speed, pull)
+                if time < out:
+                    out, s.exit_side[i] = time, 2 * k
+            if speed > 0.0 or pull > 0.0:
+                time = now + land(side - above, -speed, -pull)
+                if time < out:
+                    out, s.exit_side[i] = time, 2 * k + 1
+    s.leaves[i] = out < s.contact[i]
+    reschedule(world.queue, i, out if s.leaves[i] else s.contact[i])
 
 
-@compiled
+@inlined
 def first_wall(world: World, i: int, now: float, due: float) -> float:
     """Time of the first contact with a wall if before `due`, else `due`."""
-    s, walls, touch = world.spheres, world.walls, world.rules.touch
-    x, v, a, normal, radius = s.position, s.velocity, s.acceleration, walls.normal, s.radius[i]
+    s, walls, m, a = world.spheres, world.walls, world.spheres.motion, world.spheres.acceleration
+    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, 7]
     for w in range(len(walls.level)):
         if s.rests[i, w]:
             if walls.bounded[w]:
                 due = past_the_edge(world, i, now, w, due)
             continue
-        gap, speed, pull = -walls.level[w] - radius, 0.0, 0.0
-        for k in range(3):
-            gap += normal[w, k] * x[i, k]
-            speed += normal[w, k] * v[i, k]
-            pull += normal[w, k] * a[i, k]
+        n_x, n_y, n_z = walls.normal[w, 0], walls.normal[w, 1], walls.normal[w, 2]
+        speed, pull = n_x * v_x + n_y * v_y + n_z * v_z, 0.0
+        if world.rules.pulled:
+            pull = n_x * a[i, 0] + n_y * a[i, 1] + n_z * a[i, 2]
+        if speed >= 0.0 and pull >= 0.0:
+            continue
+        gap = n_x * x + n_y * y + n_z * z - (walls.level[w] + radius)
         if abs(gap) <= GRAIN * (abs(walls.level[w]) + radius):
             gap = 0.0  # else a closed gap of round-off would give every bounce the speed of a fall through it
-        behind = walls.bounded[w] and gap < -touch
+        behind = walls.bounded[w] and gap < -world.rules.touch
         wait = fall_back(gap, speed, pull) if behind else land(gap, speed, pull)
         if now + wait < due:
             kind = where_on_face(world, i, w, wait) if walls.bounded[w] else WALL
@@ -113,25 +134,67 @@ def past_the_edge(world: World, i: int, now: float, w: int, due: float) -> float
     return due
 
 
-@compiled
-def first_sphere(world: World, i: int, now: float, due: float) -> float:
-    """Time of the first contact with another sphere of the neighbouring cells if before `due`, else `due`."""
-    s, cells, x = world.spheres, world.cells, world.spheres.position
-    size = GRAIN * (abs(x[i, 0]) + abs(x[i, 1]) + abs(x[i, 2]))
-    wide_x, wide_y, wide_z = cells.number[0] > 1, cells.number[1] > 1, cells.number[2] > 1
-    for a in range(-wide_x, wide_x + 1):
-        for b in range(-wide_y, wide_y + 1):
-            for c in range(-wide_z, wide_z + 1):
-                k = cells.head[cell_of(cells.number, cells.cube[i, 0] + a, cells.cube[i, 1] + b, cells.cube[i, 2] + c)]
+@inlined
+def first_sphere(s: Spheres, cells: Cells, pulled: bool, i: int, now: float, due: float, side: int) -> float:
+    """Time of the first contact with another sphere of the neighbouring cells if before `due`, else `due`.
+
+    side: look only into those that became neighbours by leaving a cell on that side; `NO_SIDE`: into all. `pulled`:
+    there is gravity, so that accelerations may differ.
+    """
+    n, m = cells.number, s.motion
+    from_x, to_x = span(n[0], side, 0)
+    from_y, to_y = span(n[1], side, 1)
+    from_z, to_z = span(n[2], side, 2)
+    own_x, own_y, own_z = cells.cube[i, 0] % n[0], cells.cube[i, 1] % n[1], cells.cube[i, 2] % n[2]
+    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, 7]
+    size = GRAIN * (abs(x) + abs(y) + abs(z))
+    for a in range(own_x + from_x, own_x + to_x + 1):
+        row = wrapped(a, n[0]) * n[1]
+        for b in range(own_y + from_y, own_y + to_y + 1):
+            column = (row + wrapped(b, n[1])) * n[2]
+            for c in range(own_z + from_z, own_z + to_z + 1):
+                k = cells.head[column + wrapped(c, n[2])]
                 while k != EMPTY:
                     if k != i:
-                        time = now + contact(
-                            s.position, s.velocity, s.acceleration, s.radius, i, k, now - s.time[k], size
-                        )
-                        if time < due:
-                            due, s.kind[i], s.partner[i], s.partner_events[i] = time, SPHERE, k, s.events[k]
+                        if pulled:
+                            wait = contact(
+                                s.position, s.velocity, s.acceleration, s.radius, i, k, now - s.time[k], size
+                            )
+                        else:
+                            lag = now - m[k, 6]
+                            wait = meet(
+                                m[k, 0] + lag * m[k, 3] - x,
+                                m[k, 1] + lag * m[k, 4] - y,
+                                m[k, 2] + lag * m[k, 5] - z,
+                                m[k, 3] - v_x,
+                                m[k, 4] - v_y,
+                                m[k, 5] - v_z,
+                                radius + m[k, 7],
+                            )
+                        if now + wait < due:
+                            due, s.kind[i], s.partner[i], s.partner_events[i] = now + wait, SPHERE, k, s.events[k]
                     k = cells.after[k]
     return due
+
+
+@inlined
+def wrapped(cell: int, cells: int) -> int:
+    """Number of a cell that is at most one beyond the ends, which meet."""
+    if cell < 0:
+        return cell + cells
+    return cell - cells if cell >= cells else cell
+
+
+@inlined
+def span(cells: int, side: int, axis: int) -> tuple[int, int]:
+    """First and last of the cells to look into along an axis, counted from the own one."""
+    if cells == 1:
+        return 0, 0
+    if side == 2 * axis:
+        return -1, -1
+    if side == 2 * axis + 1:
+        return 1, 1
+    return -1, 1
 
 
 @compiled

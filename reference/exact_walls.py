@@ -24,6 +24,8 @@ class Walls(NamedTuple):
     group: Indices
     bounded: Flags
     """Whether the wall is a box's face, which ends."""
+    push: Floats
+    """Room for `exact_impact.press`."""
 
 
 Wall = tuple[Vector, float, Vector, Vector, int]
@@ -49,6 +51,7 @@ def build_walls(scene: Scene, model: Model, groups: list[int]) -> Walls:
         high=np.array([wall[3] for wall in walls], dtype=np.float64).reshape(-1, 3),
         group=np.array([wall[4] for wall in walls], dtype=np.int64),
         bounded=np.array([wall[3] != FREE for wall in walls], dtype=np.bool_),
+        push=np.zeros(len(walls)),
     )
 
 

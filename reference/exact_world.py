@@ -23,9 +23,12 @@ class Spheres(NamedTuple):
 
     Position and velocity are those at the body's own `time` [s]; from there on it flies at
     constant acceleration. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which
-    outdates predictions made before. kind, partner and partner_events: its next event.
+    outdates predictions made before. contact [s], kind, partner and partner_events: its next contact; leaves: whether it
+    leaves its cell before that, on exit_side. motion [n, 8] holds position, velocity, time and radius, which are views
+    of it, in one line of the processor's cache.
     """
 
+    motion: Floats
     position: Floats
     velocity: Floats
     acceleration: Floats
@@ -35,9 +38,12 @@ class Spheres(NamedTuple):
     group: Indices
     rests: Flags
     events: Indices
+    contact: Floats
     kind: Indices
     partner: Indices
     partner_events: Indices
+    leaves: Flags
+    exit_side: Indices
     struck: Floats
     """Time [s] of its last impact."""
     crowd: Indices
@@ -48,6 +54,7 @@ class Rules(NamedTuple):
     """bounciness: table by group of bodies. rest, still [m/s], touch [m], instant [s]: see `REST`."""
 
     gravity: Floats
+    pulled: bool
     doc: bool
     collide: bool
     movable: int
@@ -82,6 +89,7 @@ def build_world(scene: Scene, law: Law, model: Model) -> World:
         walls=walls,
         rules=Rules(
             gravity=gravity,
+            pulled=bool(gravity.any()),
             doc=law == "doc",
             collide=scene.collide,
             movable=len(scene.movable),
@@ -101,19 +109,27 @@ def build_world(scene: Scene, law: Law, model: Model) -> World:
 def build_spheres(scene: Scene, order: list[int], gravity: Floats, groups: list[int], walls: int) -> Spheres:
     bodies, count = [scene.bodies[i] for i in order], len(order)
     still = np.array([body.static for body in bodies])
+    motion = np.zeros((count, 8))
+    motion[:, 0:3] = np.array([b.position for b in bodies]).reshape(-1, 3)
+    motion[:, 3:6] = np.where(still[:, None], 0.0, np.array([b.velocity for b in bodies]).reshape(-1, 3))
+    motion[:, 7] = [b.shape.radius for b in bodies if isinstance(b.shape, Sphere)]
     return Spheres(
-        position=np.array([b.position for b in bodies], dtype=np.float64).reshape(-1, 3),
-        velocity=np.where(still[:, None], 0.0, np.array([b.velocity for b in bodies], dtype=np.float64)),
+        motion=motion,
+        position=motion[:, 0:3],
+        velocity=motion[:, 3:6],
         acceleration=np.where(still[:, None], 0.0, gravity),
-        time=np.zeros(count),
-        radius=np.array([b.shape.radius for b in bodies if isinstance(b.shape, Sphere)], dtype=np.float64),
+        time=motion[:, 6],
+        radius=motion[:, 7],
         inverse_mass=np.array([0.0 if b.mass is None else 1 / b.mass for b in bodies], dtype=np.float64),
         group=np.array([groups[i] for i in order], dtype=np.int64),
         rests=np.zeros((count, walls), dtype=np.bool_),
         events=np.zeros(count, dtype=np.int64),
+        contact=np.full(count, np.inf),
         kind=np.zeros(count, dtype=np.int64),
         partner=np.zeros(count, dtype=np.int64),
         partner_events=np.zeros(count, dtype=np.int64),
+        leaves=np.zeros(count, dtype=np.bool_),
+        exit_side=np.zeros(count, dtype=np.int64),
         struck=np.zeros(count),
         crowd=np.zeros(count, dtype=np.int64),
     )

@@ -162,7 +162,7 @@ def test_cells_change_nothing(law, monkeypatch):
     cut = engine(world, law, 0.1)
     monkeypatch.setattr(events_cells, "FEW", 1000)
     whole = engine(world, law, 0.1)
-    assert cut.settings["cells"] == (4, 4, 4)
+    assert cut.settings["cells"] == (5, 5, 5)
     assert whole.settings["cells"] == (1, 1, 1)
     for run in (cut, whole):
         run.advance(5)
@@ -198,9 +198,8 @@ def test_a_ball_passes_beside_a_box_and_lands_on_it_from_above():
 def test_a_box_edge_is_declared():
     table = Body("table", Box((1.0, 1.0, 0.5)), None, (0.0, 0.0, 0.5))
     for drop in (ball("ball", (1.05, 0, 3)), ball("ball", (0.9, 0, 1.1), (1, 0, 0))):
-        run = engine(scene([table, drop], gravity=G, bounciness=0.5))
         with pytest.raises(Unsupported, match=r"test\[case=1\]: t = .* s: a sphere comes to a box's edge"):
-            run.advance(2)
+            engine(scene([table, drop], gravity=G, bounciness=0.5))
 
 
 @laws
@@ -313,7 +312,7 @@ def test_the_bound_of_events_raises(monkeypatch):
 def test_stacks_are_declared(law, b):
     column = [FLOOR, ball("low", (0, 0, 0.2)), ball("high", (0, 0, 0.6))]
     with pytest.raises(Unsupported, match=r"test\[case=1\]: t = .*does not stack"):
-        engine(scene(column, (2,), G, bounciness=b), law).advance(10)
+        engine(scene(column, (2,), G, bounciness=b), law)
 
 
 def test_what_is_not_done_is_declared():
