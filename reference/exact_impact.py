@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.exact_world import World
 

@@ -47,7 +47,7 @@ def predict(world: World, i: int, now: float) -> None:
 
 @inlined
 def enter_cell(world: World, i: int, now: float) -> None:
-    """Sphere i has come to the next cell at `now` [s]: only the cells that are new to it can hold an earlier contact."""
+    """Sphere i comes to the next cell at `now` [s]: only cells that are new to it can hold an earlier contact."""
     s = world.spheres
     fly(world, i, now)
     cross(world.cells, i, s.exit_side[i])

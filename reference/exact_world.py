@@ -21,11 +21,11 @@ height of an elastic bounce that counts as rest."""
 class Spheres(NamedTuple):
     """Movable spheres first, in scene order, then static ones with inverse mass 0. SI units, shapes [n] and [n, 3].
 
-    Position and velocity are those at the body's own `time` [s]; from there on it flies at
-    constant acceleration. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which
-    outdates predictions made before. contact [s], kind, partner and partner_events: its next contact; leaves: whether it
-    leaves its cell before that, on exit_side. motion [n, 8] holds position, velocity, time and radius, which are views
-    of it, in one line of the processor's cache.
+    Position and velocity are those at the body's own `time` [s]; from there on it flies at constant acceleration.
+    motion [n, 8] holds position, velocity, time and radius, which are views of it, in one line of the processor's
+    cache. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which outdates
+    predictions made before. contact [s], kind, partner, partner_events: its next contact; leaves: whether it leaves
+    its cell before that, on exit_side.
     """
 
     motion: Floats
