@@ -16,6 +16,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from impactbench.reports.bench_lane import lane
+from impactbench.reports.bench_model import smallest, statics
 from impactbench.reports.bench_race import OURS, Race, run_race
 from impactbench.scenarios import crowds
 
@@ -130,6 +132,9 @@ BENCHMARKS: dict[str, Callable[[bool], Part]] = {
     "exact": exact,
     "growth": growth,
     "startup": startup,
+    "lane": lane,
+    "smallest": smallest,
+    "statics": statics,
 }
 
 

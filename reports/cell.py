@@ -20,6 +20,8 @@ from impactbench.scenarios.records import FULL, Law, Scene, shifted
 from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case
 
+READS = 5
+"""Reads that are timed after each timed run: enough for a clock of 50 ns, few enough to cost nothing beside it."""
 MOST_GAPS = 50_000_000
 """Gaps of pairs over all steps of a run: some 60 bytes each, 3 GB. Scene files and hard cases can ask for more."""
 
@@ -185,42 +187,64 @@ def plain(value: object) -> object:
     return value if isinstance(value, (str, int, float, bool)) or value is None else str(value)
 
 
-def time_cells(argument: tuple[Sequence[tuple[Cell, Contestant]], int]) -> dict[str, list[float]]:
-    """Wall seconds per simulated second of each cell, one number a round: cells take turns, in alternating order.
+Times = dict[str, list[float]]
 
-    A warm-up round goes first. Building is outside the clock; nothing is read inside it. A run whose final state is
-    not finite has no speed and is left out.
+
+class Empty:
+    """An engine that does nothing: what the timing lane clocks of it is the harness' own share."""
+
+    def advance(self, _: int) -> None:
+        """Do nothing."""
+
+
+def time_cells(argument: tuple[Sequence[tuple[Cell, Contestant]], int]) -> dict[str, Times]:
+    """Times of each cell, one number a round: cells take turns, in alternating order, after a round of warm-up.
+
+    `run` and `harness`: wall seconds per simulated second of the cell's engine and of one that does nothing, by the
+    same path; `read`: seconds of one read of the state. Building is outside the clock; nothing is read inside it. A run
+    whose final state is not finite has no speed and is left out.
     """
     cells, rounds = argument
-    times: dict[str, list[float]] = {cell.key: [] for cell, _ in cells}
+    times: dict[str, Times] = {cell.key: {"run": [], "harness": [], "read": []} for cell, _ in cells}
     for turn in range(rounds + 1):
         for cell, contestant in cells if turn % 2 else reversed(cells):
-            seconds = _time_once(cell, contestant)
-            if turn and seconds is not None:
-                times[cell.key].append(seconds)
-    return {key: seconds for key, seconds in times.items() if len(seconds) == rounds}
+            found = _time_once(cell, contestant)
+            for name, seconds in found.items() if turn else ():
+                times[cell.key][name].append(seconds)
+    return {key: found for key, found in times.items() if len(found["run"]) == rounds}
 
 
-def _time_once(cell: Cell, contestant: Contestant) -> float | None:
+def _time_once(cell: Cell, contestant: Contestant) -> dict[str, float]:
     engine = build(cell, contestant)
     step = cell.step_seconds
     count = step_count(case_of(cell).scene, step)
     gc.disable()
     try:
+        elapsed, nothing = run_seconds(engine, count), run_seconds(Empty(), count)
         start = time.perf_counter()
-        engine.advance(count)
-        elapsed = time.perf_counter() - start
-        final = engine.read()
+        for _ in range(READS):
+            final = engine.read()
+        read = (time.perf_counter() - start) / READS
     finally:
         gc.enable()
         engine.close()
-    valid = bool(np.isfinite(final.positions).all() and np.isfinite(final.velocities).all())
-    return elapsed / (count * step) if valid else None
+    if not (np.isfinite(final.positions).all() and np.isfinite(final.velocities).all()):
+        return {}
+    return {"run": elapsed / (count * step), "harness": nothing / (count * step), "read": read}
 
 
-def timing_figures(seconds: Sequence[float]) -> list[Figure]:
-    """Minimum, median and the interval that holds the true median with at least 95 % (order statistics, binomial)."""
-    ordered = sorted(seconds)
+def run_seconds(engine: Engine | Empty, count: int) -> float:
+    """Wall seconds of `count` steps: all that stands inside the clock of the timing lane."""
+    start = time.perf_counter()
+    engine.advance(count)
+    return time.perf_counter() - start
+
+
+def timing_figures(times: Times) -> list[Figure]:
+    """Minimum, median and the interval that holds the true median with at least 95 % (order statistics, binomial);
+    medians of what a read costs and of the harness' own share.
+    """
+    ordered = sorted(times["run"])
     low, high = median_ranks(len(ordered))
     return [
         Figure("wall_time", float(np.median(ordered))),
@@ -228,6 +252,8 @@ def timing_figures(seconds: Sequence[float]) -> list[Figure]:
         Figure("wall_time_low", ordered[low]),
         Figure("wall_time_high", ordered[high]),
         Figure("wall_repeats", float(len(ordered))),
+        Figure("wall_harness", float(np.median(times["harness"]))),
+        Figure("wall_read", float(np.median(times["read"]))),
     ]
 
 

@@ -17,8 +17,9 @@ from impactbench.adapters.contestants import CONTESTANTS, Contestant
 from impactbench.adapters.isolation import Job, Outcome, run_jobs
 from impactbench.reports import executors, machine, results
 from impactbench.reports.cache import Cache
-from impactbench.reports.cell import Cell, step_seconds, timing_figures
+from impactbench.reports.cell import Cell, Times, step_seconds, timing_figures
 from impactbench.reports.measures import Figure, law_difference
+from impactbench.reports.null import limits_of
 from impactbench.reports.replay import replays
 from impactbench.scenarios.catalogue import FAMILIES
 from impactbench.scenarios.hard import HARD
@@ -129,7 +130,7 @@ def compare(
     document: dict[str, Any] = {
         "schema": results.SCHEMA,
         "provenance": provenance(command, plan.contestants, load),
-        "cases": [describe(case) for case in plan.cases],
+        "cases": [describe(case) | limits_of(case) for case in plan.cases],
         "cells": [],
         "rows": [],
         "law_difference": [
@@ -147,7 +148,7 @@ def compare(
         progress("replays", 1, 1)
     for cell, contestant in cells:
         outcome = outcomes[cell.key]
-        repeats = {"repeats": timings[cell.key]} if timings.get(cell.key) else {}
+        repeats = {"repeats": timings[cell.key]["run"]} if timings.get(cell.key) else {}
         document["cells"].append(_cell_record(cell, contestant, outcome) | repeats)
         figures: list[Figure] = outcome.get("figures", [])
         figures = [*figures, *(timing_figures(timings[cell.key]) if timings.get(cell.key) else [])]
@@ -223,7 +224,7 @@ def _timed(plan: Plan, cells: Sequence[Entry], outcomes: dict[str, dict[str, Any
 
 def timing_lane(
     groups: Sequence[list[Entry]], progress: Progress, executor: Executor | None = None
-) -> tuple[dict[str, list[float]], list[str]]:
+) -> tuple[dict[str, Times], list[str]]:
     """One process, one thread, one case after another. A group that fails has no times but a note that says why."""
     if not groups:
         return {}, []
@@ -233,7 +234,7 @@ def timing_lane(
         for group in groups
     ]
     work = [machine.check_job("before"), *work, machine.check_job("after")]
-    times: dict[str, list[float]] = {}
+    times: dict[str, Times] = {}
     notes: list[str] = []
     checks: dict[str, Any] = {}
     # All of them on one worker: times of two machines do not compare.

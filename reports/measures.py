@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from impactbench.reports import conservation
 from impactbench.reports.impacts import Impact, PairHistory, find_impacts, impact_error, pair_histories, restitution
+from impactbench.reports.split import split
 from impactbench.scenarios.records import Law, Scene
 from impactbench.scenarios.trajectory import Floats, State, Trajectory
 from impactbench.scenarios.truth import Case, Truth
@@ -20,8 +21,8 @@ COMPARED_TIMES = 60
 
 EXPLAINED = 1e-3
 """A tenth of the error that reports ask for by default: from here on a figure says when it was reached."""
-TIMES = ("wall_time", "wall_time_min", "wall_time_low", "wall_time_high")
-UNITS = {"impact_time_error": "s"} | dict.fromkeys(TIMES, "s/s")
+TIMES = ("wall_time", "wall_time_min", "wall_time_low", "wall_time_high", "wall_harness")
+UNITS = {"impact_time_error": "s", "wall_read": "s"} | dict.fromkeys(TIMES, "s/s")
 """Units of the measures that are not dimensionless."""
 
 
@@ -56,12 +57,15 @@ def measure(case: Case, law: Law, trajectory: Trajectory, delay: float = 0.0) ->
     scene = case.scene
     pairs = pair_histories(scene, trajectory)
     impacts = [] if scene.model.rotation else find_impacts(scene, trajectory, pairs)
-    return [
+    found = [
         *_against_truth(scene, case.truths[law], trajectory, delay),
         *_conserved(scene, law, case.truths[law], trajectory, pairs, impacts, delay),
         *_at_impacts(scene, law, case.truths[law], trajectory, impacts, delay),
         *_penetration(scene, pairs, trajectory),
     ]
+    known = {figure.measure: (figure.measure, figure.value, figure.time, figure.bodies) for figure in found}
+    momenta = conservation.spin_momenta(scene, trajectory) if trajectory.spins is not None else None
+    return [*found, *(Figure(*part) for part in split(scene, trajectory, pairs, known, momenta))]
 
 
 def _against_truth(scene: Scene, truth: Truth, trajectory: Trajectory, delay: float) -> Iterator[Figure]:

@@ -94,6 +94,8 @@ def speed_chart(view: View, name: str, case: dict[str, Any], points: pd.DataFram
         for kind, label in (("null", "null model"), ("floor", "the truth's own floor"))
         if (column := f"{kind}_{case['headline']}") in points and points[column].notna().any()
     ]
+    limits += [(value, words(name)) for name, value in case.get("null", {}).items() if value]
+    limits += [(case["floor"], "round-off")] if "floor" in case else []
     with charts.debug_mode(False):  # no validation of every part against the schema: it doubles the time
         plot = charts.work_precision(points[COLUMNS], failures(view, case["name"]), view.style, titles, limits)
         plot = plot.properties(description=f"{cost} against {over}; the table below holds the same data")

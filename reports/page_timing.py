@@ -17,8 +17,10 @@ def timing(view: View) -> dict[str, Any] | None:
     timed = view.cells[view.cells["repeats"].map(lambda found: isinstance(found, list) and bool(found))]
     if not len(timed):
         return None
+    known = _figures(view)
     rows = [
         {
+            **known.get(index, {}),
             "case": cell["case"],
             "policy": cell["policy"],
             "step": cell["step_text"],
@@ -26,13 +28,36 @@ def timing(view: View) -> dict[str, Any] | None:
             "least": 1e3 * min(cell["repeats"]),
             "repeats": " ".join(number(1e3 * seconds) for seconds in cell["repeats"]),
         }
-        for _, cell in timed.iterrows()
+        for index, cell in timed.iterrows()
     ]
     return {"rows": rows, "overhead": _overhead(view, timed)}
 
 
+def _figures(view: View) -> dict[Any, dict[str, float]]:
+    """By cell: what one read of the state costs [us], and the harness' share of the clocked time; older results have
+    neither.
+    """
+    found: dict[Any, dict[str, float]] = {}
+    for row in view.document["rows"]:
+        if row["measure"].startswith("wall_"):
+            found.setdefault(row["cell"], {})[row["measure"]] = row["value"]
+    return {
+        index: {"read": 1e6 * times["wall_read"], "share": times["wall_harness"] / times["wall_time"]}
+        for index, times in found.items()
+        if {"wall_read", "wall_harness", "wall_time"} <= set(times) and times["wall_time"] > 0
+    }
+
+
 def _overhead(view: View, timed: pd.DataFrame) -> str:
-    """The clock's own time as a part of the shortest run that was timed."""
+    """The harness' part of the runs that were timed: measured with an engine that does nothing, else its clock's."""
+    shares = [figures["share"] for figures in _figures(view).values()]
+    if shares:
+        middle, most = float(np.median(shares)), max(shares)
+        return (
+            "The harness' own share of the clocked time, measured with an engine that does nothing, is "
+            f"{percent(middle)} in the median and at most {percent(most)}. Reading the state is never clocked; its "
+            "cost stands apart."
+        )
     clock = view.document["provenance"].get("clock_seconds")
     if clock is None:
         return ""

@@ -30,6 +30,11 @@ ZERO = (
     "impact_time_error",
     "restitution_error",
     "penetration_max",
+    "error_sampling",
+    "error_integrator",
+    "error_discrete",
+    "error_impact_velocity",
+    "error_penetration",
 )
 # A run of n steps sums n terms of the scale 1, each rounded to eps: n eps = 480 * 2.2e-16 = 1.1e-13. Positions up to 10
 # lengths from the origin enter the impact's instant as a difference quotient over one step: 10 eps / step = 5e-13.
