@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from impactbench.reports.page_data import number, percent, time_to
+from impactbench.reports.page_data import Line, Rung, number, percent, time_to
 from impactbench.reports.page_view import View
 from impactbench.reports.terminal import table
 
@@ -23,10 +22,10 @@ def target_of(text: str) -> float:
     return value
 
 
-def largest_step(line: pd.DataFrame, target: float) -> pd.Series | None:
+def largest_step(line: Line, target: float) -> Rung | None:
     """The coarsest rung that meets the target together with every finer one, at the worst phase."""
     met = None
-    for _, rung in line.sort_values("step").iterrows():
+    for rung in line:
         if rung["state"] != "ok" or not rung["error"] <= target:
             break
         met = rung
@@ -48,11 +47,10 @@ def advice(document: dict[str, Any], target: float) -> str:
     return f"{table(columns, rows)}\n\n{_sentence(case, target, found)}"
 
 
-def _row(cost: float, policy: str, step: pd.Series | None, cheapest: pd.Series | None, line: pd.DataFrame) -> list[str]:
+def _row(cost: float, policy: str, step: Rung | None, cheapest: Rung | None, line: Line) -> list[str]:
     if step is None:
-        states = line[line["state"] != "ok"]
-        why = f"{states['state'].iloc[0]}: {states['reason'].iloc[0]}" if len(states) else ""
-        finest = line.sort_values("step").iloc[0]
+        why = next((f"{rung['state']}: {rung['reason']}" for rung in line if rung["state"] != "ok"), "")
+        finest = line[0]
         why = why or f"not reached: {percent(float(finest['error']))} at {finest['step_text']}"
         return [policy, "-", "-", "-", "-", why]
     cheap = [str(cheapest["step_text"]), number(cost)] if cheapest is not None else ["-", "-"]

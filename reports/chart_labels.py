@@ -26,9 +26,12 @@ def place(
             for left in (x + 9, x - 9 - width):
                 option = (left, top, left + width, top + LINE)
                 outside = left < inside[0] or top < inside[1] or option[2] > inside[2] or option[3] > inside[3]
+                away = abs(top + LINE / 2 - y) / LINE + 100 * outside
+                if away >= best:  # whatever it lies over
+                    continue
                 hits = sum(overlap(option, other) for other in taken)
                 crossed = sum(overlap(option, other) for other in lines)
-                cost = abs(top + LINE / 2 - y) / LINE + 2 * min(crossed, 2) + 30 * hits + 100 * outside
+                cost = away + 2 * min(crossed, 2) + 30 * hits
                 if cost < best:
                     best, box = cost, option
         taken.append(box)

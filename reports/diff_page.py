@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from impactbench.reports import charts, diff_text, page, results
 from impactbench.reports.chart_svg import svg_of
 from impactbench.reports.diff import BETTER, MARKS, SAME, UNKNOWN, WORSE, Change, Diff
-from impactbench.reports.page_data import words
-from impactbench.reports.page_family import COLUMNS
+from impactbench.reports.page_data import Rung, words
 from impactbench.reports.page_view import View
 
 ROWS = 1000  # changes a table holds, some 300 bytes each
@@ -77,24 +75,21 @@ def chart(diff: Diff) -> dict[str, Any] | None:
     wanted = list(dict.fromkeys([*order, *(change.policy for change in diff.changes if change.case == case)]))[
         :POLICIES
     ]
-    parts = []
+    points: list[Rung] = []
     for view, when in zip(views, ("before", "after"), strict=True):
-        points = view.drawable()
-        points = points[(points["case"] == case) & points["policy"].isin(wanted)][COLUMNS]
-        parts.append(
-            points.assign(policy=points["policy"] + f" · {when}", profile="default" if when == "before" else "other")
-        )
-    points = pd.concat(parts, ignore_index=True)
-    if not len(points) or points["timed"].nunique() > 1:
+        profile = "default" if when == "before" else "other"
+        found = [point for point in view.points(case) if point["policy"] in wanted]
+        points += [{**point, "policy": f"{point['policy']} · {when}", "profile": profile} for point in found]
+    timings = {point["timed"] for point in points}
+    if len(timings) != 1:
         return None
     described = views[1].cases[case]
-    style = charts.Style(list(dict.fromkeys(points["engine"])), list(dict.fromkeys(points["policy"])))
-    timed = "wall time per simulated second [ms]" if points["timed"].all() else "steps per simulated second (not timed)"
+    style = charts.Style(*(tuple(dict.fromkeys(point[key] for point in points)) for key in ("engine", "policy")))
+    timed = "wall time per simulated second [ms]" if timings == {True} else "steps per simulated second (not timed)"
     titles = (words(described["headline"]), timed)
-    with charts.debug_mode(False):
-        plot = charts.work_precision(points, points.iloc[:0], style, titles)
-        plot = plot.properties(description=f"{titles[1]} against {titles[0]}, before and after")
-        return {"case": case, "svg": svg_of(plot.to_dict(validate=False), "chart")}
+    spec = charts.work_precision(points, [], style, titles)
+    spec["description"] = f"{titles[1]} against {titles[0]}, before and after"
+    return {"case": case, "svg": svg_of(spec, "chart")}
 
 
 def _case(diff: Diff, views: tuple[View, View]) -> str | None:

@@ -6,6 +6,8 @@ A rung is one (case, policy, step); its figures are those of the worst impact ph
 from __future__ import annotations
 
 import decimal
+import itertools
+import math
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -18,11 +20,13 @@ TARGETS = tuple(float(f"{digit}e{power}") for power in range(-6, 1) for digit in
 """Targets the slider offers: 1 millionth to 1 in steps of 1, 2, 5."""
 FLOOR = 1e-12  # round-off of a computation in doubles at scene scale: below it no two errors can be told apart
 KEYS = ["case", "policy", "step"]
+Rung = dict[str, Any]  # figures of one (case, policy, step) by name; NaN where nothing was measured
+Line = list[Rung]  # all rungs of one (case, policy), finest first
 
 
 def number(value: float | None) -> str:
     """Three significant digits; a dash where nothing was measured."""
-    return "–" if value is None or np.isnan(value) else f"{value:.3g}"
+    return "–" if value is None or math.isnan(value) else f"{value:.3g}"
 
 
 def percent(value: float) -> str:
@@ -89,38 +93,33 @@ def tidy_rungs(cells: pd.DataFrame, rows: list[dict[str, Any]]) -> pd.DataFrame:
     return bad.drop_duplicates(KEYS, keep="last").join(wide, on=KEYS).drop(columns="bad")
 
 
-def time_to(line: pd.DataFrame, target: float) -> pd.Series | None:
+def time_to(line: Line, target: float) -> Rung | None:
     """Cheapest rung that meets the target together with every finer one; no credit for a lucky step."""
-    met = []
-    for _, rung in line.sort_values("step").iterrows():
-        if rung["state"] != "ok" or not rung["error"] <= target:
-            break
-        met.append(rung)
+    met = itertools.takewhile(lambda rung: rung["state"] == "ok" and rung["error"] <= target, line)
     # What moves from event to event has no step to pay for: where nothing is timed it has no cost at all.
-    known = [rung for rung in met if not np.isnan(rung["cost"]) or not rung["timed"]]
+    known = [rung for rung in met if not math.isnan(rung["cost"]) or not rung["timed"]]
     return min(known, key=expense) if known else None
 
 
-def expense(rung: pd.Series) -> float:
+def expense(rung: Rung) -> float:
     """Cost of a rung to the digits that are shown; 0 where there is none."""
-    return 0.0 if np.isnan(rung["cost"]) else float(number(rung["cost"]))
+    return 0.0 if math.isnan(rung["cost"]) else float(number(rung["cost"]))
 
 
-def order(line: pd.DataFrame) -> dict[str, Any] | None:
+def order(line: Line) -> dict[str, Any] | None:
     """Least-squares slope of log error against log step on the four finest rungs that stand above round-off."""
-    usable = line[(line["state"] == "ok") & (line["step"] > 0) & (line["error"] > 100 * FLOOR)]
-    usable = usable.sort_values("step").head(4)
+    usable = [rung for rung in line if rung["state"] == "ok" and rung["step"] > 0 and rung["error"] > 100 * FLOOR][:4]
     if len(usable) < 3:
         return None
-    x, y = np.log(usable["step"].to_numpy(float)), np.log(usable["error"].to_numpy(float))
+    x, y = (np.log([rung[key] for rung in usable]) for key in ("step", "error"))
     slope, offset = (float(c) for c in np.polyfit(x, y, 1))
     spread = float(np.std(x) * np.std(y))
     r2 = float(np.mean((x - x.mean()) * (y - y.mean())) / spread) ** 2 if spread > 0 else 0.0
     fit = [(float(np.exp(end)), float(np.exp(offset + slope * end))) for end in (x[0], x[-1])]
-    return {"slope": slope, "r2": r2, "rungs": listing(usable["step_text"]), "fit": fit}
+    return {"slope": slope, "r2": r2, "rungs": listing(rung["step_text"] for rung in usable), "fit": fit}
 
 
-def price(rung: pd.Series) -> str:
+def price(rung: Rung) -> str:
     """Cost of a rung for a sentence that has named the unit."""
     step = f"{rung['step_text']} s" if rung["step"] > 0 else "no fixed step"
     return f"{number(rung['cost'])} ({step})" if rung["timed"] else step

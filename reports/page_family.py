@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import statistics
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
 from impactbench.reports import charts, charts_plain
 from impactbench.reports.chart_svg import Drawing, rounded
-from impactbench.reports.page_data import amount, listing, order, words
+from impactbench.reports.page_data import Rung, amount, listing, order, words
 from impactbench.reports.page_scores import reach
 
 if TYPE_CHECKING:
@@ -19,12 +19,12 @@ MAX_CHARTS = 24  # each costs some 60 kB (drawing and specification) and a quart
 
 def section(view: View, index: int, family: str, names: list[str]) -> dict[str, Any]:
     """One family: the charts of one of its cases and the tables of all."""
-    drawable = view.drawable()
-    charted = [name for name in names if (drawable["case"] == name).any()]
-    timed = [name for name in charted if drawable.loc[drawable["case"] == name, "timed"].any()]
+    charted = [name for name in names if view.points(name)]
+    timed = [name for name in charted if any(point["timed"] for point in view.points(name))]
     name = view.featured if view.featured in names else (timed or charted or names)[0]
     case = view.cases[name]
-    points = drawable[drawable["case"] == name]
+    points = view.points(name)
+    ordered = sorted(points, key=lambda point: (point["policy"], point["step"]))
     orders = {policy: order(line) for policy, line in view.of(name).items()}
     drawn = len(points) > 0 and index < MAX_CHARTS
     differences = [row for row in view.document.get("law_difference", []) if row["case"] in names]
@@ -42,12 +42,12 @@ def section(view: View, index: int, family: str, names: list[str]) -> dict[str, 
         "orders": orders,
         "measures": measure_table(view, name),
         "shown": measures,
-        "rungs": rung_data(view, points, measures) if drawn else None,
-        "data": points.sort_values(["policy", "step"]).to_dict("records"),
+        "rungs": rung_data(view, ordered, measures) if drawn else None,
+        "data": ordered,
         "others": finest_errors(view, names),
         "laws": [row for row in differences if row["value"]],
         "same_laws": [row for row in differences if not row["value"]],
-        "failed": failures(view, name).to_dict("records"),
+        "failed": failures(view, name),
     }
 
 
@@ -55,98 +55,101 @@ NO_ERROR = ("wall_", "restitution_measured", "offset_energy", "null_", "floor_",
 """Measures that are no errors: nothing to draw a speed against."""
 
 
-def shown_measures(view: View, case: dict[str, Any], points: pd.DataFrame) -> list[str]:
+def shown_measures(view: View, case: dict[str, Any], points: list[Rung]) -> list[str]:
     """Error measures of a case, its headline first."""
-    known = [m for m in view.measures if not m.startswith(NO_ERROR) and m in points and points[m].notna().any()]
+    known = [m for m in view.measures if not m.startswith(NO_ERROR) and measured(points, m)]
     return sorted(known, key=lambda measure: measure != case["headline"])
 
 
-def rung_data(view: View, points: pd.DataFrame, measures: list[str]) -> dict[str, Any]:
+def measured(points: list[Rung], measure: str) -> list[float]:
+    """Values of a measure where it was taken."""
+    values = (float(point.get(measure, math.nan)) for point in points)
+    return [value for value in values if not math.isnan(value)]
+
+
+def rung_data(view: View, points: list[Rung], measures: list[str]) -> dict[str, Any]:
     """What a script draws after a switch of the measure: one row a rung, errors unsigned."""
     rows = [
         [view.policies.index(rung["policy"]), float(f"{rung['step']:.6g}"), rung["step_text"], _short(rung["cost"])]
         + [_short(rung[measure]) for measure in measures]
-        for _, rung in points.sort_values(["policy", "step"]).iterrows()
+        for rung in points
     ]
     return {"measures": measures, "units": [view.units[measure] for measure in measures], "rows": rows}
 
 
 def _short(value: float) -> float | None:
-    return None if np.isnan(value) else float(f"{abs(value):.3g}")
+    return None if math.isnan(value) else float(f"{abs(value):.3g}")
 
 
-def titles_of(view: View, case: dict[str, Any], points: pd.DataFrame) -> tuple[str, str]:
+def titles_of(view: View, case: dict[str, Any], points: list[Rung]) -> tuple[str, str]:
     """What the error and the cost of a case are."""
     unit = view.unit_of(case["name"])
     over = f"{words(case['headline'])}" + (" (1 = the scene's own scale)" if unit == "1" else f" [{unit}]")
-    timed = bool(points["timed"].all())
+    timed = all(point["timed"] for point in points)
     return over, "wall time per simulated second [ms]" if timed else "steps per simulated second (not timed)"
 
 
-COLUMNS = ["policy", "engine", "profile", "step", "step_text", "error", "cost", "low", "high", "timed"]
-
-
-def speed_chart(view: View, name: str, case: dict[str, Any], points: pd.DataFrame) -> dict[str, Any]:
+def speed_chart(view: View, name: str, case: dict[str, Any], points: list[Rung]) -> dict[str, Any]:
     """Specification and static drawing of cost against error."""
     over, cost = titles = titles_of(view, case, points)
     limits = [
-        (float(points[column].abs().median()), label)
+        (statistics.median(map(abs, values)), label)
         for kind, label in (("null", "null model"), ("floor", "the truth's own floor"))
-        if (column := f"{kind}_{case['headline']}") in points and points[column].notna().any()
+        if (values := measured(points, f"{kind}_{case['headline']}"))
     ]
     limits += [(value, words(name)) for name, value in case.get("null", {}).items() if value]
     limits += [(case["floor"], "round-off")] if "floor" in case else []
-    with charts.debug_mode(False):  # no validation of every part against the schema: it doubles the time
-        plot = charts.work_precision(points[COLUMNS], failures(view, case["name"]), view.style, titles, limits)
-        plot = plot.properties(description=f"{cost} against {over}; the table below holds the same data")
-        spec = rounded(plot.to_dict(validate=False))
-    timed = bool(points["timed"].all())
+    spec = charts.work_precision(points, failures(view, case["name"]), view.style, titles, limits)
+    spec = rounded({**spec, "description": f"{cost} against {over}; the table below holds the same data"})
+    timed = all(point["timed"] for point in points)
     return {"id": name, "spec": spec, "svg": Drawing(spec, name), "timed": timed, "over": over, "cost": cost}
 
 
 def convergence_chart(
-    view: View, name: str, case: dict[str, Any], points: pd.DataFrame, orders: dict[str, Any]
+    view: View, name: str, case: dict[str, Any], points: list[Rung], orders: dict[str, Any]
 ) -> dict[str, Any] | None:
     """Static drawing of error against step with the fitted orders; None where nobody took three steps."""
-    stepped = points[points["step"] > 0]
-    if stepped["step"].nunique() < 3:
+    stepped = [point for point in points if point["step"] > 0]
+    if len({point["step"] for point in stepped}) < 3:
         return None
     over = titles_of(view, case, points)[0]
-    with charts.debug_mode(False):
-        plot = charts_plain.convergence(stepped[COLUMNS], orders, view.style, ("step [s]", over))
-        plot = plot.properties(description=f"{over} against step; the table below holds the same data")
-        return {"id": name, "svg": Drawing(plot.to_dict(validate=False), name)}
+    spec = charts_plain.convergence(stepped, orders, view.style, ("step [s]", over))
+    spec["description"] = f"{over} against step; the table below holds the same data"
+    return {"id": name, "svg": Drawing(spec, name)}
 
 
-def failures(view: View, case: str) -> pd.DataFrame:
+def failures(view: View, case: str) -> list[dict[str, str]]:
     """Rungs of a case without a result, one line for each policy, state and reason."""
-    rungs = view.rungs[view.rungs["case"] == case]
-    silent = (rungs["state"] == "ok") & rungs["error"].isna()  # ran, but the headline is not defined here
-    rungs = rungs.assign(state=rungs["state"].mask(silent, "no figure"))
-    bad = rungs[rungs["state"] != "ok"]
-    grouped = bad.groupby(["policy", "engine", "state", "reason"], sort=False)["step_text"]
-    return grouped.agg(lambda texts: listing(text or "every step" for text in texts)).reset_index(name="steps")
+    found: dict[tuple[str, str, str, str], list[str]] = {}
+    for rung in view.by_case[case]:
+        silent = rung["state"] == "ok" and math.isnan(rung["error"])  # ran, but the headline is not defined here
+        state = "no figure" if silent else rung["state"]
+        if state != "ok":
+            key = rung["policy"], rung["engine"], state, rung["reason"]
+            found.setdefault(key, []).append(rung["step_text"] or "every step")
+    names = ("policy", "engine", "state", "reason")
+    return [{**dict(zip(names, key, strict=True)), "steps": listing(texts)} for key, texts in found.items()]
 
 
 def measure_table(view: View, case: str) -> dict[str, Any]:
     """Every measure by policy, at the finest step that all stepping policies with a result share."""
-    ran = {p: line[line["state"] == "ok"] for p, line in view.of(case).items()}
-    ran = {p: line for p, line in ran.items() if len(line)}
-    ladders = [set(line["step"]) for line in ran.values() if (line["step"] > 0).any()]
+    lines = {policy: [rung for rung in line if rung["state"] == "ok"] for policy, line in view.of(case).items()}
+    ladders = [{rung["step"] for rung in line} for line in lines.values() if any(rung["step"] > 0 for rung in line)]
     common = min(set.intersection(*ladders), default=None) if ladders else None
-    chosen = {}
-    for policy, line in ran.items():
-        same = line[line["step"] == common]
-        chosen[policy] = (same if len(same) else line.sort_values("step")).iloc[0]
+    chosen = {
+        policy: next((rung for rung in line if rung["step"] == common), line[0])
+        for policy, line in lines.items()
+        if line
+    }
     rows = [
         {
             "name": measure,
             "unit": view.units[measure],
-            "values": [rung.get(measure, np.nan) for rung in chosen.values()],
+            "values": [rung.get(measure, math.nan) for rung in chosen.values()],
         }
         for measure in view.measures
+        if measured(list(chosen.values()), measure)
     ]
-    rows = [row for row in rows if not all(np.isnan(value) for value in row["values"])]
     steps = [rung["step_text"] or "none" for rung in chosen.values()]
     return {"policies": list(chosen), "steps": steps, "rows": rows}
 
@@ -163,7 +166,7 @@ def finest(view: View, case: str, policy: str) -> str:
     line = view.lines.get((case, policy))
     if line is None:
         return "–"
-    rung = line.sort_values("step").iloc[0]
+    rung = line[0]
     if rung["state"] != "ok":
         return str(rung["state"])
     return amount(rung["error"], view.unit_of(case)) if rung["error"] >= 0 else "–"

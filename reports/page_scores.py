@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
-from impactbench.reports.page_data import TARGET, expense, isolated, listing, number, price, rounded_up, time_to
+from impactbench.reports.page_data import (
+    TARGET,
+    Line,
+    Rung,
+    expense,
+    isolated,
+    listing,
+    number,
+    price,
+    rounded_up,
+    time_to,
+)
 
 if TYPE_CHECKING:
     from impactbench.reports.page_view import View
@@ -18,7 +28,7 @@ def scoreboard(view: View) -> list[dict[str, Any]]:
     rows = []
     for name, case in view.cases.items():
         cells = [score(view, name, policy) for policy in view.policies]
-        timed = any(line["timed"].any() for line in view.of(name).values())
+        timed = any(rung["timed"] for line in view.of(name).values() for rung in line)
         bad = sum(cell["kind"] != "met" for cell in cells)
         rows.append({"case": case, "cells": cells, "bad": bad, "timed": timed, "unit": view.unit_of(name)})
     return sorted(rows, key=lambda row: -int(row["bad"]))
@@ -29,20 +39,25 @@ def score(view: View, case: str, policy: str) -> dict[str, Any]:
     line = view.lines.get((case, policy))
     if line is None:
         return {"kind": "none", "text": "–", "ladder": None}
-    if not (line["state"] == "ok").any():
-        return {"kind": "state", "text": str(line.iloc[0]["state"]), "ladder": None}
+    if not ran(line):
+        return {"kind": "state", "text": str(line[0]["state"]), "ladder": None}
     ladder = []
-    for _, rung in line.sort_values("step").iterrows():
-        usable = rung["state"] == "ok" and not np.isnan(rung["error"])
-        cost = "" if not rung["timed"] else None if np.isnan(rung["cost"]) else number(rung["cost"])
+    for rung in line:
+        usable = rung["state"] == "ok" and not math.isnan(rung["error"])
+        cost = "" if not rung["timed"] else None if math.isnan(rung["cost"]) else number(rung["cost"])
         ladder.append([rounded_up(rung["error"]) if usable else None, cost, rung["step_text"]])
-    rung = time_to(line, TARGET)
-    if rung is None:
+    best = time_to(line, TARGET)
+    if best is None:
         return {"kind": "missed", "text": "✕ not reached", "ladder": ladder}
-    return {"kind": "met", "text": f"✓ {_short(rung)}", "ladder": ladder}
+    return {"kind": "met", "text": f"✓ {_short(best)}", "ladder": ladder}
 
 
-def _short(rung: pd.Series) -> str:
+def ran(line: Line) -> bool:
+    """Whether any rung has a result."""
+    return any(rung["state"] == "ok" for rung in line)
+
+
+def _short(rung: Rung) -> str:
     return f"{number(rung['cost'])} ms" if rung["timed"] else rung["step_text"] or "any step"
 
 
@@ -51,11 +66,11 @@ def reach(view: View, case: str, target: float = TARGET) -> str:
     lines = view.of(case)
     found = {policy: time_to(line, target) for policy, line in lines.items()}
     reached = sorted(((expense(r), p, r) for p, r in found.items() if r is not None), key=lambda item: item[:2])
-    missed = [p for p, r in found.items() if r is None and (lines[p]["state"] == "ok").any()]
-    silent = [p for p in lines if not (lines[p]["state"] == "ok").any()]
+    missed = [p for p, r in found.items() if r is None and ran(lines[p])]
+    silent = [p for p in lines if not ran(lines[p])]
     best = [f"{isolated(p)} {price(rung)}" for _, p, rung in reached]
     goal = view.goal(view.cases[case], target)
-    timed = any(line["timed"].any() for line in lines.values())
+    timed = any(rung["timed"] for line in lines.values() for rung in line)
     scale = "ms per simulated second" if timed else "coarsest step that does"
     text = f"To stay below {goal}, {scale}: {'; '.join(best)}." if best else f"No policy stays below {goal}."
     if missed and best:

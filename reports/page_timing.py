@@ -74,21 +74,22 @@ def savings(view: View) -> list[dict[str, Any]]:
         small = view.lines.get((case, policy.replace(" · full", "")))
         if small is None:
             continue
-        both = small[small["state"] == "ok"].merge(full[full["state"] == "ok"], on="step", suffixes=("", "_full"))
-        if not len(both):
+        whole = {rung["step"]: rung for rung in full if rung["state"] == "ok"}
+        rung = next((rung for rung in small if rung["state"] == "ok" and rung["step"] in whole), None)
+        if rung is None:
             continue
-        rung = both.sort_values("step").iloc[0]
-        timed = rung["timed"] and rung["timed_full"]
+        other = whole[rung["step"]]
+        timed = rung["timed"] and other["timed"]
         found.append(
             {
                 "case": case,
                 "policy": policy.replace(" · full", ""),
                 "step": rung["step_text"],
                 "small": rung["cost"] if timed else np.nan,
-                "full": rung["cost_full"] if timed else np.nan,
-                "saved": percent(1 - rung["cost"] / rung["cost_full"]) if timed else "not timed",
+                "full": other["cost"] if timed else np.nan,
+                "saved": percent(1 - rung["cost"] / other["cost"]) if timed else "not timed",
                 "error": rung["error"],
-                "change": rung["error"] - rung["error_full"],
+                "change": rung["error"] - other["error"],
             }
         )
     return found

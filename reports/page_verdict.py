@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from impactbench.reports.page_data import (
     TARGET,
+    Rung,
     counted,
     expense,
     isolated,
@@ -116,7 +117,7 @@ def _cheapest(view: View) -> str:
     return text + "."
 
 
-def _cost(rung: pd.Series) -> str:
+def _cost(rung: Rung) -> str:
     return number(rung["cost"]) if rung["timed"] else price(rung)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from impactbench.reports import (
     page_verdict,
     replay_view,
 )
-from impactbench.reports.page_data import TARGET, TARGETS, percent, tidy_cells, tidy_rungs
+from impactbench.reports.page_data import TARGET, TARGETS, Line, Rung, percent, tidy_cells, tidy_rungs
 from impactbench.reports.page_family import MAX_CHARTS, section
 
 
@@ -30,9 +31,16 @@ class View:
         self.measures = list(dict.fromkeys(row["measure"] for row in document["rows"]))
         self.rungs = self.with_axes(tidy_rungs(self.cells, document["rows"]))
         self.policies = list(dict.fromkeys(self.cells["policy"]))
-        engines = list(dict.fromkeys(policy.split("/")[0] for policy in self.policies))
-        self.style = charts.Style(engines, self.policies)
-        self.lines = dict(iter(self.rungs.sort_values("step", kind="stable").groupby(["case", "policy"], sort=False)))
+        engines = dict.fromkeys(policy.split("/")[0] for policy in self.policies)
+        self.style = charts.Style(tuple(engines), tuple(self.policies))
+        # Plain rows: what is asked of one case or one line at a time costs a hundred times as much of a frame.
+        rows = self.rungs.to_dict("records")
+        self.by_case: dict[str, list[Rung]] = {name: [] for name in self.cases}
+        self.lines: dict[tuple[str, str], Line] = {}
+        for rung in rows:
+            self.by_case[rung["case"]].append(rung)
+        for rung in sorted(rows, key=lambda rung: float(rung["step"])):
+            self.lines.setdefault((rung["case"], rung["policy"]), []).append(rung)
         self.featured = self.stacked_or_first()
         self.sources: dict[str, str] = document["provenance"].get("engines", {})
         self.thinned: list[str] = []
@@ -56,13 +64,18 @@ class View:
         rungs = rungs.astype(dict.fromkeys(rungs.select_dtypes("str").columns, object))
         return rungs
 
-    def of(self, case: str) -> dict[str, pd.DataFrame]:
+    def of(self, case: str) -> dict[str, Line]:
         """Rungs of a case by policy."""
         return {policy: self.lines[case, policy] for policy in self.policies if (case, policy) in self.lines}
 
     def drawable(self) -> pd.DataFrame:
         """Rungs that a chart can show: with an error and a cost."""
         return self.rungs[self.rungs["error"].notna() & self.rungs["cost"].notna() & (self.rungs["state"] == "ok")]
+
+    def points(self, case: str) -> list[Rung]:
+        """Rungs of a case that a chart can show."""
+        found = self.by_case.get(case, [])
+        return [r for r in found if r["state"] == "ok" and not (math.isnan(r["error"]) or math.isnan(r["cost"]))]
 
     def finest_rungs(self) -> pd.DataFrame:
         """The finest rung of every case and policy, where it has a result."""

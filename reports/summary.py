@@ -39,7 +39,7 @@ def markdown(document: dict[str, Any]) -> str:
 
 
 def _timed(view: View) -> list[str]:
-    return [name for name in view.cases if any(line["timed"].any() for line in view.of(name).values())]
+    return [name for name in view.cases if any(rung["timed"] for line in view.of(name).values() for rung in line)]
 
 
 def _legend(view: View) -> str:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import shlex
 
+import altair as alt
 from click.testing import CliRunner
-from impactbench.reports import page, page_failures, page_scores
+from impactbench.reports import charts, charts_plain, page, page_failures, page_scores
 from impactbench.reports.cli import main
 from impactbench.reports.compare import Plan, compare
 from impactbench.reports.options import cases_of, contestants_of
+from impactbench.reports.page_data import order
 from impactbench.reports.page_view import View
 from test_page import Maker, case, document, small, specs
 
@@ -86,3 +88,23 @@ def test_a_contestant_without_a_step_reaches_its_target_where_nothing_is_timed()
     assert page_scores.reach(found, "a") == (
         "To stay below 1 % error, coarsest step that does: x/exact no fixed step; x/y 1/60 s."
     )
+
+
+def test_charts_are_filled_copies_of_one_description_that_keeps_to_the_schema() -> None:
+    view = View(small())
+    known = [name for name in view.cases if len({point["step"] for point in view.points(name)}) >= 3]
+    orders = {policy: order(line) for policy, line in view.of(known[0]).items()}
+    points = view.points(known[0])
+    specs = []
+    for limits in ([(0.5, "null model")], []):
+        specs.append(charts.work_precision(points, [], view.style, ("error", "cost"), limits))
+        specs.append(
+            charts_plain.convergence([p for p in points if p["step"] > 0], orders, view.style, ("step", "error"))
+        )
+    for spec in specs:
+        alt.LayerChart.from_dict(spec, validate=True)
+        # Nothing is drawn of data that are not there, and no data are there for nothing.
+        assert {layer["data"]["name"] for layer in spec["layer"]} == set(spec["datasets"])
+    assert ["limits" in spec["datasets"] for spec in specs] == [True, False, False, False]
+    assert specs[1] == specs[3]  # what went into a chart does not stay for the next
+    assert all("datasets" not in make(view.style) for make in (charts.speed_layers, charts_plain.order_layers))
