@@ -79,6 +79,7 @@ def check(
     """
     selection = _selection(cases, engines, profile, law, steps, jobs, names, until, budgets, baseline)
     _must_be_writable(outputs)
+    _measures_must_be_right()
 
     from impactbench.reports import gate
     from impactbench.reports.verdicts import exit_code
@@ -131,16 +132,29 @@ def _must_be_writable(outputs: Mapping[str, Any]) -> None:
     """Before anything is run: a folder that cannot be written costs no minutes."""
     from impactbench.reports.options import writable_folder
 
-    for name in ("junit", "summary", "failures"):
+    for name in ("junit", "summary", "failures", "file"):
         path: Path | None = outputs.get(name)
         if path:
             try:
                 with tempfile.NamedTemporaryFile(dir=path.parent):
                     pass
             except OSError as error:
-                raise click.UsageError(f"cannot write --{name} {path}: {error.strerror}") from None
+                option = "" if name == "file" else f"--{name} "
+                raise click.UsageError(f"cannot write {option}{path}: {error.strerror}") from None
+    if outputs.get("summary"):
+        _earlier(outputs["summary"])
     if outputs.get("out"):
         writable_folder(outputs["out"])
+
+
+def _measures_must_be_right() -> None:
+    from impactbench.reports import calibration
+    from impactbench.reports.verdicts import INCOMPLETE
+
+    if wrong := calibration.faults():
+        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        click.echo(f"the measures are not right: {wrong[0]}{more}; nothing was judged", err=True)
+        sys.exit(INCOMPLETE)
 
 
 def _against(path: Path, document: dict[str, Any], selection: Selection) -> list[Verdict]:
@@ -160,7 +174,8 @@ def _tell(
     if outputs["as_json"]:
         import json
 
-        click.echo(json.dumps(verdict_text.as_json(verdicts, document, code), indent=1, allow_nan=False))
+        told = verdict_text.as_json(verdicts, document, code, findings)
+        click.echo(json.dumps(told, indent=1, allow_nan=False))
     else:
         click.echo(verdict_text.text(verdicts, findings))
         if outputs["margins"]:
@@ -185,8 +200,7 @@ def _write(
         results.write_text(junit, junit_text(verdicts, findings, document["provenance"]))
     if summary:
         text = ci_text.summary(verdicts, findings, document["provenance"], code)
-        earlier = summary.read_text(encoding="utf-8") if summary.exists() else ""
-        results.write_text(summary, earlier + text)
+        results.write_text(summary, _earlier(summary) + text)
     if failures is None and (junit or summary):
         failures = (junit or summary).parent / "failures.sh"
     if failures:
@@ -196,6 +210,18 @@ def _write(
 
         results.save(document, outputs["out"] / "results.json")
         page.write_page(document, outputs["out"] / "report.html")
+
+
+def _earlier(summary: Path) -> str:
+    """What an earlier step wrote, to be kept: refused before anything is run where it is no text."""
+    if not summary.exists():
+        return ""
+    try:
+        return summary.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise click.UsageError(f"cannot append to --summary {summary}: it is not UTF-8 text") from None
+    except OSError as error:
+        raise click.UsageError(f"cannot append to --summary {summary}: {error.strerror}") from None
 
 
 @click.command()
@@ -242,7 +268,8 @@ def accept(
     selection = _selection(cases, engines, profile, law, steps, jobs)
     if not reason.strip():
         raise click.UsageError("--reason is empty: say why these figures are right")
-    _must_be_writable({"junit": None, "summary": None, "failures": file})
+    _must_be_writable({"file": file})
+    _measures_must_be_right()
 
     from impactbench.reports import baseline as baselines
     from impactbench.reports import gate

@@ -34,6 +34,7 @@ def junit(verdicts: Sequence[Verdict], findings: Iterable[Finding], provenance: 
     for number, (cell, checks) in enumerate(suites.items()):
         document.append(_suite(number, cell, checks, commands, provenance))
     document.update_statistics()
+    document._elem.attrib.pop("skipped", None)  # Jenkins' junit-10.xsd knows it in a suite only
     text: bytes = document.tostring()
     return text.decode("utf-8")
 
@@ -74,7 +75,10 @@ def _suite(
 def _testcase(verdict: Verdict, finding: Finding | None) -> TestCase:
     testcase = TestCase(verdict.check, f"{verdict.contestant}.{verdict.case}", 0.0)
     message = told(verdict)
-    details = message if finding is None else f"{message}\nfirst at t = {finding.time:.6g} s\n{finding.shortest}"
+    details = message
+    if finding is not None:
+        first = f"first at t = {finding.time:.6g} s\n" if math.isfinite(finding.time) else ""
+        details = f"{message}\n{first}{finding.shortest}"
     match verdict.status:
         case "failed":
             testcase.result = [_with_text(Failure(message, verdict.check), details)]

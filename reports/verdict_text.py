@@ -99,10 +99,20 @@ def margins(verdicts: Sequence[Verdict]) -> str:
     return table(["check", "contestant", "budget", "worst", "allowed", "share", "case"], sorted(rows))
 
 
-def as_json(verdicts: Sequence[Verdict], document: Mapping[str, Any], code: int) -> dict[str, Any]:
-    """Everything a program needs; numbers that are none are null."""
-    rows = [
-        {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in asdict(verdict).items()}
-        for verdict in verdicts
-    ]
-    return {"exit_code": code, "counts": counts(verdicts), "provenance": document["provenance"], "verdicts": rows}
+def as_json(
+    verdicts: Sequence[Verdict], document: Mapping[str, Any], code: int, findings: Sequence[Finding] = ()
+) -> dict[str, Any]:
+    """Everything a program needs; numbers that are none are null. A finding carries its worst verdict, how many there
+    are, the first time [s], the bodies and the commands.
+    """
+    return {
+        "exit_code": code,
+        "counts": counts(verdicts),
+        "provenance": document["provenance"],
+        "verdicts": [_nulled(asdict(verdict)) for verdict in verdicts],
+        "findings": [_nulled(asdict(finding) | {"verdict": _nulled(asdict(finding.verdict))}) for finding in findings],
+    }
+
+
+def _nulled(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in fields.items()}

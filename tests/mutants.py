@@ -2,8 +2,9 @@
 
 Every mutant is run through what `impactbench check` runs: cells in child processes, judged by the budgets. It is caught
 if that gives exit code 1 (3 for what cannot be measured) by a failure that the contestant without the fault does not
-have, and caught *rightly* if a check that is there for it is among them. A fault of a measure may instead be caught by
-the measures' own tests, which are then run with the fault in.
+have, and caught *rightly* if a check that is there for it is among them. A fault of a measure that hides faults fails
+no true run: `impactbench check` itself is then started with the fault in, and must refuse to judge (exit code 3)
+because its calibration (reports/calibration.py) is off; else the measures' own tests are run with it.
 """
 
 from __future__ import annotations
@@ -87,8 +88,11 @@ def outcomes(
         if chosen:
             rows += judged(cases, base, chosen, file, jobs, faults)
     for row in rows:
-        if row["kind"] == "measure" and not row["caught by"] and own_tests and not measures_own_tests_pass(row["name"]):
-            row["caught by"] = "own tests"
+        if row["kind"] == "measure" and not row["caught by"] and own_tests:
+            if refusal := check_refuses(row["name"]):
+                row |= {"caught by": "check", "exit code": 3, "checks": ["calibration"], "where": refusal}
+            elif not measures_own_tests_pass(row["name"]):
+                row["caught by"] = "own tests"
     return rows
 
 
@@ -132,6 +136,24 @@ def judged(
     return rows
 
 
+WITH_FAULT = """import sys, measure_mutants
+measure_mutants.apply(sys.argv.pop(1))
+from impactbench.reports.cli import main
+main()
+"""
+
+
+def check_refuses(name: str) -> str:
+    """Why `impactbench check`, whose measures have the fault, judges nothing; empty where it does."""
+    words = ["check", "free_flight[dimension=1]", "--engine", "pymunk"]
+    done = subprocess.run(
+        [sys.executable, "-c", WITH_FAULT, name, *words], env=os.environ | {"PYTHONPATH": str(FAKES)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    told = done.stderr.strip().splitlines()
+    return told[-1] if done.returncode == 3 and told and told[-1].startswith("the measures are not right: ") else ""
+
+
 def measures_own_tests_pass(name: str) -> bool:
     """The measures' tests, with the fault in the code they test."""
     environment = os.environ | {"IMPACTBENCH_MUTANT": name, "PYTHONPATH": str(FAKES)}
@@ -153,13 +175,15 @@ def text(rows: list[dict[str, Any]]) -> str:
     ]  # fmt: skip
     caught = [row for row in rows if row["caught by"]]
     rightly = [row for row in rows if row["caught by"] == "check"]
+    refused = [row for row in rows if row["checks"] == ["calibration"]]
     own = [row for row in rows if row["caught by"] == "own tests"]
     return "\n".join(
         [
             table(["mutant", "fault", "exit", "caught by", "failed checks, or why none"], lines),
             "",
-            f"{len(rows)} mutants: {len(caught)} caught ({100 * len(caught) / len(rows):.1f} %), {len(rightly)} by the "
-            f"right check, {len(own)} by the measures' own tests, {len(rows) - len(caught)} not caught",
+            f"{len(rows)} mutants: {len(caught)} caught ({100 * len(caught) / len(rows):.1f} %), {len(rightly)} "
+            f"rightly by check ({len(refused)} of them by its calibration), {len(own)} by the measures' own tests, "
+            f"{len(rows) - len(caught)} not caught",
         ]
     )
 

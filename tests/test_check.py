@@ -52,13 +52,13 @@ def test_the_three_engines_pass_and_every_output_is_as_ci_reads_it(tmp_path: Pat
 
     cases = ["oblique_pair[offset=0.5,bounciness=0.5]", "stacked_drop[shape=box,count=3]", "coulomb_slide[heading=45]"]
     cases += ["rolling_onset[friction=0.3]", "bouncing_ball[bounciness=0.8]"]
-    engines = [word for name in ("pybullet", "mujoco", "pymunk") for word in ("--engine", name)]
+    engines = [word for name in ("pybullet", "mujoco", "pymunk", "reference") for word in ("--engine", name)]
     done = impactbench("check", *cases, *engines, "--junit", "j.xml", "--summary", "s.md", "--margins", cwd=tmp_path)
     assert done.returncode == 0, done.stdout
     assert " 0 failed, 0 error, 0 unavailable" in done.stdout
     xmlschema.validate(str(tmp_path / "j.xml"), str(HERE / "data" / "junit.xsd"))
     suites = list(JUnitXml.fromfile(str(tmp_path / "j.xml")))
-    assert len(suites) == 3 * len(cases)
+    assert len(suites) == 5 * len(cases)  # the reference has a stepped and an exact runner
     figures = {p.name: p.value for p in suites[0].properties()}
     assert 0 <= float(figures["momentum momentum_drift"]) <= float(figures["momentum budget"])
     assert "impactbench check: passed" in (tmp_path / "s.md").read_text()
@@ -77,8 +77,12 @@ def test_a_failure_names_law_numbers_time_bodies_and_a_command_that_shows_it_aga
     assert found[1] == "first at t = 0.2792 s; bodies A, B"  # A meets B 0.83 m away at 3 m/s: t = 0.2767 s, + one step
     command = shlex.split(found[2])
     assert command[command.index("--until") + 1] == "0.279166667"
-    again = here(*command[1:])
+    again = here(*command[1:], "--json")
     assert again.returncode == 1
+    (told,) = json.loads(again.stdout)["findings"]
+    assert (told["bodies"], told["verdict"]["check"]) == (["A", "B"], "restitution")
+    assert told["time"] == pytest.approx(67 / 240)
+    assert told["shortest"] == found[2]
     earlier = ["0.275" if word == "0.279166667" else word for word in command]
     assert here(*earlier[1:]).returncode != 1  # one step less shows nothing: it is the shortest run
     suite = next(iter(JUnitXml.fromfile(str(tmp_path / "j.xml"))))
