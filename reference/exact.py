@@ -14,7 +14,7 @@ from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.events_queue import earliest
 from impactbench.reference.exact_impact import settle, strike_sphere, strike_wall
 from impactbench.reference.exact_predict import EDGE, SPHERE, enter_cell, fly, predict
-from impactbench.reference.exact_world import World
+from impactbench.reference.exact_world import RADIUS, SPEED, World
 
 REACHED, TOO_MANY, CROWDED, AT_EDGE = 0, 1, 2, 3
 """How a run ends: at its time, at the bound of events, at impacts without end in one instant, at a box's edge."""
@@ -29,12 +29,12 @@ def begin(world: World) -> None:
     s, walls, rules = world.spheres, world.walls, world.rules
     for i in range(rules.movable):
         for w in range(len(walls.level)):
-            gap, speed, pull = -walls.level[w] - s.radius[i], 0.0, 0.0
+            gap, speed, pull = -walls.level[w] - s.motion[i, RADIUS], 0.0, 0.0
             for k in range(3):
-                gap += s.position[i, k] * walls.normal[w, k]
-                speed += s.velocity[i, k] * walls.normal[w, k]
+                gap += s.motion[i, k] * walls.normal[w, k]
+                speed += s.motion[i, SPEED + k] * walls.normal[w, k]
                 pull += rules.gravity[k] * walls.normal[w, k]
-            inside = (s.position[i] >= walls.low[w]).all() and (s.position[i] <= walls.high[w]).all()
+            inside = (s.motion[i, :3] >= walls.low[w]).all() and (s.motion[i, :3] <= walls.high[w]).all()
             s.rests[i, w] = inside and abs(gap) <= rules.touch and abs(speed) <= rules.rest and pull < 0.0
         settle(world, i)
     for i in range(rules.movable):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from impactbench.reference.exact import AT_EDGE, CROWDED, REACHED, begin, run
 from impactbench.reference.exact_checks import check_scene
-from impactbench.reference.exact_world import World, build_world
+from impactbench.reference.exact_world import SPEED, TIME, World, build_world
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
@@ -75,9 +75,9 @@ class Exact:
     def read(self) -> State:
         """Positions and velocities now; each body has a time of its own, so reading changes nothing."""
         s, count = self._world.spheres, self._world.rules.movable
-        span = (self._done * self._step - s.time[:count])[:, None]
-        velocity, pull = s.velocity[:count], s.acceleration[:count]
-        return State(s.position[:count] + span * (velocity + span / 2 * pull), velocity + span * pull)
+        m, pull = s.motion[:count], s.acceleration[:count]
+        span, velocity = self._done * self._step - m[:, TIME, None], m[:, SPEED : SPEED + 3]
+        return State(m[:, :3] + span * (velocity + span / 2 * pull), velocity + span * pull)
 
     def close(self) -> None:
         """Nothing is held outside Python's memory."""
@@ -85,5 +85,5 @@ class Exact:
 
 def may_stop(world: World) -> bool:
     """Whether spheres could come to lie on one another or to an edge, where this runner ends."""
-    many, elastic = len(world.spheres.radius) > 1, bool((world.rules.bounciness == 1.0).all())
+    many, elastic = len(world.spheres.motion) > 1, bool((world.rules.bounciness == 1.0).all())
     return bool(world.walls.bounded.any()) or (many and (world.rules.pulled or not elastic))

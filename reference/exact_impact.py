@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from impactbench.reference.compiled import compiled, inlined
-from impactbench.reference.exact_world import World
+from impactbench.reference.exact_world import SPEED, World
 
 SWEEPS = 1000
 
@@ -23,22 +23,22 @@ def strike_sphere(world: World, i: int, k: int) -> bool:
     True if the pair stays in touch: one lies on the other, pressed by gravity, and no longer bounces.
     """
     s, b = world.spheres, world.rules.bounciness[world.spheres.group[i], world.spheres.group[k]]
-    x, v = s.position, s.velocity
-    d_x, d_y, d_z = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    m = s.motion
+    d_x, d_y, d_z = m[k, 0] - m[i, 0], m[k, 1] - m[i, 1], m[k, 2] - m[i, 2]
     d, square = (d_x, d_y, d_z), d_x * d_x + d_y * d_y + d_z * d_z
     # (u . n) n = (u . d) d/d^2: the root of d^2, whose rounding would drift the energy, is not needed.
-    along = ((v[k, 0] - v[i, 0]) * d_x + (v[k, 1] - v[i, 1]) * d_y + (v[k, 2] - v[i, 2]) * d_z) / square
+    along = ((m[k, 3] - m[i, 3]) * d_x + (m[k, 4] - m[i, 4]) * d_y + (m[k, 5] - m[i, 5]) * d_z) / square
     if along >= 0.0:
         return False
     share_i = s.inverse_mass[k] / (s.inverse_mass[i] + s.inverse_mass[k])
     share_k = s.inverse_mass[i] / (s.inverse_mass[i] + s.inverse_mass[k])
     pull = 0.0
     for axis in range(3):
-        common = share_i * v[i, axis] + share_k * v[k, axis]
-        u = v[k, axis] - v[i, axis]
+        one, other = m[i, SPEED + axis], m[k, SPEED + axis]
+        common, u = share_i * one + share_k * other, other - one
         after = b * (u - 2.0 * along * d[axis]) if world.rules.doc else u - (1.0 + b) * along * d[axis]
-        v[i, axis] = common - share_k * after
-        v[k, axis] = common + share_i * after
+        m[i, SPEED + axis] = common - share_k * after
+        m[k, SPEED + axis] = common + share_i * after
         pull += (s.acceleration[k, axis] - s.acceleration[i, axis]) * d[axis]
     return bool(pull < 0.0 and -b * along * math.sqrt(square) <= world.rules.rest)
 
@@ -54,7 +54,7 @@ def strike_wall(world: World, i: int, w: int) -> None:
     """
     s, n, rules = world.spheres, world.walls.normal[w], world.rules
     b = rules.bounciness[s.group[i], world.walls.group[w]]
-    v = s.velocity[i]
+    v = s.motion[i, SPEED : SPEED + 3]
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
     for k in range(3):
         v[k] = b * (v[k] - 2.0 * along * n[k]) if rules.doc else v[k] - (1.0 + b) * along * n[k]
@@ -80,12 +80,12 @@ def settle(world: World, i: int) -> None:
         if s.rests[i, w]:
             along = 0.0
             for k in range(3):
-                along += s.velocity[i, k] * walls.normal[w, k]
+                along += s.motion[i, SPEED + k] * walls.normal[w, k]
             s.rests[i, w] = abs(along) <= rules.rest
             resting |= s.rests[i, w]
             if s.rests[i, w]:
                 for k in range(3):
-                    s.velocity[i, k] -= along * walls.normal[w, k]
+                    s.motion[i, SPEED + k] -= along * walls.normal[w, k]
     for k in range(3):
         s.acceleration[i, k] = rules.gravity[k]
     if resting:

@@ -8,7 +8,7 @@ from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.events_cells import EMPTY, Cells, cross
 from impactbench.reference.events_queue import reschedule
 from impactbench.reference.events_roots import curve, fall_back, land, meet
-from impactbench.reference.exact_world import Spheres, World
+from impactbench.reference.exact_world import RADIUS, SPEED, TIME, Spheres, World
 from impactbench.scenarios.trajectory import Floats
 
 NOTHING, SPHERE, WALL, EDGE = 0, 1, 2, 3
@@ -24,11 +24,11 @@ GRAIN = 1e-15
 def fly(world: World, i: int, now: float) -> None:
     """Bring a sphere to `now` [s] on its parabola."""
     s = world.spheres
-    span = now - s.time[i]
+    span = now - s.motion[i, TIME]
     for k in range(3):
-        s.position[i, k] += span * (s.velocity[i, k] + span / 2.0 * s.acceleration[i, k])
-        s.velocity[i, k] += span * s.acceleration[i, k]
-    s.time[i] = now
+        s.motion[i, k] += span * (s.motion[i, SPEED + k] + span / 2.0 * s.acceleration[i, k])
+        s.motion[i, SPEED + k] += span * s.acceleration[i, k]
+    s.motion[i, TIME] = now
 
 
 @inlined
@@ -81,7 +81,7 @@ def queue_next(world: World, i: int, now: float) -> None:
 def first_wall(world: World, i: int, now: float, due: float) -> float:
     """Time of the first contact with a wall if before `due`, else `due`."""
     s, walls, m, a = world.spheres, world.walls, world.spheres.motion, world.spheres.acceleration
-    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, 7]
+    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, RADIUS]
     for w in range(len(walls.level)):
         if s.rests[i, w]:
             if walls.bounded[w]:
@@ -110,9 +110,9 @@ def where_on_face(world: World, i: int, w: int, wait: float) -> int:
     """Whether a sphere that comes level with a box's face in `wait` [s] meets the face, its edge, or passes beside."""
     s, kind = world.spheres, WALL
     for k in range(3):
-        at = s.position[i, k] + wait * (s.velocity[i, k] + wait / 2.0 * s.acceleration[i, k])
+        at = s.motion[i, k] + wait * (s.motion[i, SPEED + k] + wait / 2.0 * s.acceleration[i, k])
         beside = max(world.walls.low[w, k] - at, at - world.walls.high[w, k])
-        if beside >= s.radius[i]:
+        if beside >= s.motion[i, RADIUS]:
             return NOTHING
         if beside > 0.0:
             kind = EDGE
@@ -125,7 +125,7 @@ def past_the_edge(world: World, i: int, now: float, w: int, due: float) -> float
     s, walls = world.spheres, world.walls
     for k in range(3):
         if math.isfinite(walls.low[w, k]):
-            at, speed, pull = s.position[i, k], s.velocity[i, k], s.acceleration[i, k]
+            at, speed, pull = s.motion[i, k], s.motion[i, SPEED + k], s.acceleration[i, k]
             one = land(at - walls.low[w, k], speed, pull)
             other = land(walls.high[w, k] - at, -speed, -pull)
             time = now + min(one, other)
@@ -146,7 +146,7 @@ def first_sphere(s: Spheres, cells: Cells, pulled: bool, i: int, now: float, due
     from_y, to_y = span(n[1], side, 1)
     from_z, to_z = span(n[2], side, 2)
     own_x, own_y, own_z = cells.cube[i, 0] % n[0], cells.cube[i, 1] % n[1], cells.cube[i, 2] % n[2]
-    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, 7]
+    x, y, z, v_x, v_y, v_z, radius = m[i, 0], m[i, 1], m[i, 2], m[i, 3], m[i, 4], m[i, 5], m[i, RADIUS]
     size = GRAIN * (abs(x) + abs(y) + abs(z))
     for a in range(own_x + from_x, own_x + to_x + 1):
         row = wrapped(a, n[0]) * n[1]
@@ -157,11 +157,9 @@ def first_sphere(s: Spheres, cells: Cells, pulled: bool, i: int, now: float, due
                 while k != EMPTY:
                     if k != i:
                         if pulled:
-                            wait = contact(
-                                s.position, s.velocity, s.acceleration, s.radius, i, k, now - s.time[k], size
-                            )
+                            wait = contact(m, s.acceleration, i, k, now, size)
                         else:
-                            lag = now - m[k, 6]
+                            lag = now - m[k, TIME]
                             wait = meet(
                                 m[k, 0] + lag * m[k, 3] - x,
                                 m[k, 1] + lag * m[k, 4] - y,
@@ -169,7 +167,7 @@ def first_sphere(s: Spheres, cells: Cells, pulled: bool, i: int, now: float, due
                                 m[k, 3] - v_x,
                                 m[k, 4] - v_y,
                                 m[k, 5] - v_z,
-                                radius + m[k, 7],
+                                radius + m[k, RADIUS],
                             )
                         if now + wait < due:
                             due, s.kind[i], s.partner[i], s.partner_events[i] = now + wait, SPHERE, k, s.events[k]
@@ -198,16 +196,17 @@ def span(cells: int, side: int, axis: int) -> tuple[int, int]:
 
 
 @compiled
-def contact(x: Floats, v: Floats, a: Floats, radius: Floats, i: int, k: int, lag: float, size: float) -> float:
-    """Time until spheres i and k touch, k's state being `lag` [s] old: a quadratic if they share their acceleration."""
+def contact(m: Floats, a: Floats, i: int, k: int, now: float, size: float) -> float:
+    """Time until spheres i, which is at `now` [s], and k touch: a quadratic if they share their acceleration."""
+    lag = now - m[k, TIME]
     p, q, r = a[k, 0] - a[i, 0], a[k, 1] - a[i, 1], a[k, 2] - a[i, 2]
-    d_x = x[k, 0] + lag * (v[k, 0] + lag / 2.0 * a[k, 0]) - x[i, 0]
-    d_y = x[k, 1] + lag * (v[k, 1] + lag / 2.0 * a[k, 1]) - x[i, 1]
-    d_z = x[k, 2] + lag * (v[k, 2] + lag / 2.0 * a[k, 2]) - x[i, 2]
-    u_x = v[k, 0] + lag * a[k, 0] - v[i, 0]
-    u_y = v[k, 1] + lag * a[k, 1] - v[i, 1]
-    u_z = v[k, 2] + lag * a[k, 2] - v[i, 2]
-    reach = radius[i] + radius[k]
+    d_x = m[k, 0] + lag * (m[k, 3] + lag / 2.0 * a[k, 0]) - m[i, 0]
+    d_y = m[k, 1] + lag * (m[k, 4] + lag / 2.0 * a[k, 1]) - m[i, 1]
+    d_z = m[k, 2] + lag * (m[k, 5] + lag / 2.0 * a[k, 2]) - m[i, 2]
+    u_x = m[k, 3] + lag * a[k, 0] - m[i, 3]
+    u_y = m[k, 4] + lag * a[k, 1] - m[i, 4]
+    u_z = m[k, 5] + lag * a[k, 2] - m[i, 5]
+    reach = m[i, RADIUS] + m[k, RADIUS]
     if p == 0.0 and q == 0.0 and r == 0.0:
         return meet(d_x, d_y, d_z, u_x, u_y, u_z, reach)
     return curve(d_x, d_y, d_z, u_x, u_y, u_z, p, q, r, reach, size + GRAIN * reach)

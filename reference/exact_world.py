@@ -18,22 +18,22 @@ counts as touching at t = 0, span of time that counts as one instant, and
 height of an elastic bounce that counts as rest."""
 
 
+SPEED, TIME, RADIUS = 3, 6, 7
+"""Columns of `Spheres.motion`; velocity begins at SPEED, position at 0."""
+
+
 class Spheres(NamedTuple):
     """Movable spheres first, in scene order, then static ones with inverse mass 0. SI units, shapes [n] and [n, 3].
 
-    Position and velocity are those at the body's own `time` [s]; from there on it flies at constant acceleration.
-    motion [n, 8] holds position, velocity, time and radius, which are views of it, in one line of the processor's
-    cache. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which outdates
-    predictions made before. contact [s], kind, partner, partner_events: its next contact; leaves: whether it leaves
-    its cell before that, on exit_side.
+    motion [n, 8]: position, velocity, time and radius, in one line of the processor's cache; `SPEED`, `TIME` and
+    `RADIUS` are its columns. Position and velocity are those at the body's own time [s]; from there on it flies at
+    constant acceleration. rests [n, walls]: walls the body rests on. events: number of changes of its motion, which
+    outdates predictions made before. contact [s], kind, partner, partner_events: its next contact; leaves: whether
+    it leaves its cell before that, on exit_side.
     """
 
     motion: Floats
-    position: Floats
-    velocity: Floats
     acceleration: Floats
-    time: Floats
-    radius: Floats
     inverse_mass: Floats
     group: Indices
     rests: Flags
@@ -101,7 +101,7 @@ def build_world(scene: Scene, law: Law, model: Model) -> World:
             rise=RISE * scene.length,
         ),
         queue=build_queue(len(scene.movable)),
-        cells=build_cells(spheres.position, spheres.radius, model.axes),
+        cells=build_cells(spheres.motion[:, :3], spheres.motion[:, RADIUS], model.axes),
         tally=np.zeros(2, dtype=np.int64),
     )
 
@@ -110,16 +110,12 @@ def build_spheres(scene: Scene, order: list[int], gravity: Floats, groups: list[
     bodies, count = [scene.bodies[i] for i in order], len(order)
     still = np.array([body.static for body in bodies])
     motion = np.zeros((count, 8))
-    motion[:, 0:3] = np.array([b.position for b in bodies]).reshape(-1, 3)
-    motion[:, 3:6] = np.where(still[:, None], 0.0, np.array([b.velocity for b in bodies]).reshape(-1, 3))
-    motion[:, 7] = [b.shape.radius for b in bodies if isinstance(b.shape, Sphere)]
+    motion[:, :3] = np.array([b.position for b in bodies]).reshape(-1, 3)
+    motion[:, SPEED : SPEED + 3] = np.where(still[:, None], 0.0, np.array([b.velocity for b in bodies]).reshape(-1, 3))
+    motion[:, RADIUS] = [b.shape.radius for b in bodies if isinstance(b.shape, Sphere)]
     return Spheres(
         motion=motion,
-        position=motion[:, 0:3],
-        velocity=motion[:, 3:6],
         acceleration=np.where(still[:, None], 0.0, gravity),
-        time=motion[:, 6],
-        radius=motion[:, 7],
         inverse_mass=np.array([0.0 if b.mass is None else 1 / b.mass for b in bodies], dtype=np.float64),
         group=np.array([groups[i] for i in order], dtype=np.int64),
         rests=np.zeros((count, walls), dtype=np.bool_),
