@@ -86,11 +86,18 @@ def compare(
     timing = "all" if sweep.full else timing
     plan = Plan(chosen, contestants, steps or LADDER, law, models, shifts, jobs, timing, replay)
     document = sweep.run(plan, shlex.join(["impactbench", *sys.argv[1:]]), folder)
+    if timing == "all":
+        from impactbench.reports import time_to_error
+        from impactbench.reports.page_view import View
+
+        document["time_to_error"] = time_to_error.rows(View(document))
     _write(document, folder)
     from impactbench.reports.summary import verdict_lines
     from impactbench.reports.terminal import summary
 
     click.echo(summary(document))
+    if timing == "all":
+        click.echo("\n" + time_to_error.text(document["time_to_error"]))
     click.echo("\n" + "\n".join(verdict_lines(document)))
     click.echo(f"report: {folder / 'report.html'}")
     if not any(cell["state"] == "ok" for cell in document["cells"]):

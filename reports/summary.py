@@ -6,7 +6,7 @@ from typing import Any
 
 from impactbench.reports import page_failures, page_verdict
 from impactbench.reports.markdown import code, escape, table
-from impactbench.reports.page_data import TARGET, percent, time_to
+from impactbench.reports.page_data import TARGET, number, percent, time_to
 from impactbench.reports.page_scores import score
 from impactbench.reports.page_view import View
 
@@ -45,7 +45,10 @@ def _timed(view: View) -> list[str]:
 def _legend(view: View) -> str:
     if not _timed(view):
         return "Nothing was timed; the cases each contestant brings below the target on its ladder of steps."
-    return "Milliseconds per simulated second at the cheapest step that stays below it, as does every finer one."
+    return (
+        "Milliseconds per simulated second (95 % interval of the median) at the cheapest step that stays below it, as "
+        "does every finer one."
+    )
 
 
 def _grid(view: View) -> tuple[list[str], list[list[str]]]:
@@ -53,9 +56,19 @@ def _grid(view: View) -> tuple[list[str], list[list[str]]]:
     rows = []
     for policy in view.policies:
         reached = sum(time_to(view.lines[name, policy], TARGET) is not None for name in _known(view, policy))
-        cells = [score(view, name, policy)["text"] for name in timed]
+        cells = [_with_interval(view, name, policy) for name in timed]
         rows.append([policy, *cells, f"{reached} of {len(view.cases)}"])
     return ["contestant", *map(escape, timed), f"cases below {percent(TARGET)}"], rows
+
+
+def _with_interval(view: View, case: str, policy: str) -> str:
+    """The scoreboard's word, and the 95 % interval of the median where a time stands."""
+    line = view.lines.get((case, policy))
+    rung = None if line is None else time_to(line, TARGET)
+    word = str(score(view, case, policy)["text"])
+    if rung is None or not rung["timed"] or not rung["high"] > 0:
+        return word
+    return f"{word} ({number(rung['low'])} to {number(rung['high'])})"
 
 
 def _known(view: View, policy: str) -> list[str]:
