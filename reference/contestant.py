@@ -8,8 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 from impactbench.reference.particles import build_bodies, build_pairs, check_supported
+from impactbench.reference.rigid_run import RigidBodies
 from impactbench.reference.stepped import SWEEPS, Rules, run, start
 from impactbench.reference.swarm_run import Gas, why_not
+from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
@@ -35,8 +37,14 @@ class Stepped:
         if not all(math.isfinite(value) for value in scene.gravity):
             raise ValueError(f"{scene.name}: gravity {scene.gravity} must be finite")
         strategy = strategy_of(profile)
+        self._runner: Gas | AllPairs | RigidBodies
+        if scene.model.rotation:
+            if strategy == "revert":
+                raise Unsupported("the strategy revert is the particles'; this scene needs rotation")
+            self._runner = RigidBodies(scene, law, model, float(step))
+            self.settings = {"law": law, "strategy": strategy, "axes": model.axes, **self._runner.settings}
+            return
         check_supported(scene, law, model)
-        self._runner: Gas | AllPairs
         if strategy == "project" and len(scene.movable) > LARGE and not why_not(scene, law, model):
             self._runner = Gas(scene, model, step)
         else:

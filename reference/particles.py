@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from impactbench.reference.pairs import handled_pairs
 from impactbench.scenarios.engine import Unsupported
-from impactbench.scenarios.records import UPRIGHT, Body, Box, Contact, HalfSpace, Law, Model, Scene, Sphere
+from impactbench.scenarios.records import UPRIGHT, Body, Box, Capsule, Contact, HalfSpace, Law, Model, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats
 from numpy.typing import NDArray
 
@@ -111,9 +111,13 @@ def check(body: Body) -> None:
         values = getattr(body, field)
         if not all(math.isfinite(value) for value in values):
             raise ValueError(f"body {body.name!r}: {field} {values} must be finite")
+    if not abs(math.hypot(*body.orientation) - 1) < 1e-9:
+        raise ValueError(f"body {body.name!r}: orientation {body.orientation} must have length 1")
     match body.shape:
-        case Sphere(radius) if not (math.isfinite(radius) and radius >= 0):
+        case Sphere(radius) | Capsule(radius, _) if not (math.isfinite(radius) and radius >= 0):
             raise ValueError(f"body {body.name!r}: radius {radius} must be finite and not negative")
+        case Capsule(_, half) if not (math.isfinite(half) and half >= 0):
+            raise ValueError(f"body {body.name!r}: half_length {half} must be finite and not negative")
         case Box(half) if not all(math.isfinite(value) and value >= 0 for value in half):
             raise ValueError(f"body {body.name!r}: half_extents {half} must be finite and not negative")
         case HalfSpace(normal) if not abs(math.hypot(*normal) - 1) < 1e-9:

@@ -270,7 +270,7 @@ def test_the_full_model_of_a_scene_without_spin_is_the_same_run():
 def test_what_needs_spin_or_another_shape_is_declared():
     world = scene([FLOOR, ball("ball", (0, 0, 1.1))], (0, 2), G, bounciness=0.7, friction=0.2)
     with pytest.raises(Unsupported, match="needs rotation"):
-        engine(replace(world, model=FULL))
+        engine(replace(world, model=FULL), profile="revert")
     with pytest.raises(Unsupported, match="friction would spin"):
         engine(world, "nc", model=FULL)
     with pytest.raises(Unsupported, match="has no capsule"):
