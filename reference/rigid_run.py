@@ -17,13 +17,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from impactbench.reference.pairs import handled_pairs
-from impactbench.reference.particles import check, check_contact
+from impactbench.reference.rigid_checks import check_rigid
 from impactbench.reference.rigid_contact_solve import Key, Touch, hold, strike
-from impactbench.reference.rigid_contacts import Pose, Solid, check_pair, features
+from impactbench.reference.rigid_contacts import Pose, Solid, features
 from impactbench.reference.rigid_spin import spin_of, turn
 from impactbench.reference.triples import apply, cross, dot, exponential, length, plus, product, scale
-from impactbench.scenarios.engine import Unsupported
-from impactbench.scenarios.records import ZERO, Body, Law, Model, Scene, Vector
+from impactbench.scenarios.records import ZERO, Law, Model, Scene, Vector
 from impactbench.scenarios.trajectory import State
 
 TOUCH, KEEP, STILL = 1e-10, 1e-6, 1e-13
@@ -33,8 +32,6 @@ SWEEPS, IMPACT_SWEEPS, PROJECTIONS = 500, 200, 100
 IMPACTS = 100
 """Instants of impact in one step; what falls into a step beyond these is left to projection."""
 SEARCH = 80
-MOST = 16
-"""Movable bodies: each pair is looked at several times a step, in Python."""
 
 
 class RigidBodies:
@@ -295,28 +292,3 @@ def _lift(touch: Touch, gravity: Vector) -> None:
         touch.give(scale(touch.mass * (approach - touched), touch.normal))
         payer = touch.a if touch.b.static else touch.b
         payer.debt = max(0.0, cost - touch.mass * (approach**2 - touched**2) / 2)
-
-
-def check_rigid(scene: Scene, model: Model) -> None:
-    """ValueError for numbers that make no sense, `Unsupported` for what this runner does not do."""
-    for body in scene.bodies:
-        check(body)
-        if not body.static:
-            check_inertia(body)
-    for contact in {scene.contact, *(contact for _, _, contact in scene.pairs)}:
-        check_contact(scene.name, contact)
-    if model.dimension < 2:
-        raise Unsupported("the rigid runner turns bodies in a plane or in space; this scene has one axis")
-    if len(scene.movable) > MOST:
-        raise Unsupported(f"the rigid runner takes up to {MOST} movable bodies; this scene has {len(scene.movable)}")
-    if scene.collide:
-        for first, second in handled_pairs(scene.statics, scene.movable):
-            check_pair(scene.bodies[first], scene.bodies[second])
-
-
-def check_inertia(body: Body) -> None:
-    """Principal moments must be positive, and no one greater than the sum of the others."""
-    moments = body.principal_inertia()
-    good = all(math.isfinite(moment) and moment > 0 for moment in moments)
-    if not good or 2 * max(moments) > (1 + 1e-9) * sum(moments):
-        raise ValueError(f"body {body.name!r}: inertia {moments} must be positive, no moment above the others' sum")

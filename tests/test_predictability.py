@@ -21,6 +21,7 @@ from impactbench.reports.retold import Trial
 from impactbench.scenarios import catalogue, hard_chaos
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.hard_chaos import REACH, SPEED, dispersing_billiard, known_until, stretching
+from impactbench.scenarios.records import Body, Box
 from impactbench.scenarios.trajectory import Trajectory
 from impactbench.scenarios.truth import Case
 
@@ -141,7 +142,10 @@ def test_an_error_before_the_horizon_counts() -> None:
 
 
 def test_where_the_reference_cannot_a_contestant_runs_the_copies() -> None:
-    (case,) = catalogue.select(["rolling_onset[friction=0.3]"])
+    (rolling,) = catalogue.select(["rolling_onset[friction=0.3]"])
+    slab = Body("slab", Box((9.0, 9.0, 1.0)), None, (0.0, 0.0, -1.0))
+    block = Body("block", Box((0.2, 0.2, 0.1)), 1.0, (0.0, 0.0, 0.1), (3.0, 0.0, 0.0))
+    case = replace(rolling, scene=replace(rolling.scene, bodies=(slab, block)))  # box on box, turning
     with pytest.raises(Unsupported, match="name a contestant"):
         horizon(case)
     (pymunk,) = select(["pymunk/tuned"])
