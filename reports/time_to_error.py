@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-import numpy as np
 from impactbench.reports.page_data import TARGET, number, percent, time_to
+from impactbench.reports.page_scores import ran
 from impactbench.reports.page_view import View
 from impactbench.reports.terminal import table
 
@@ -19,15 +20,14 @@ def rows(view: View) -> list[dict[str, Any]]:
     found = []
     for case in view.cases:
         for policy, line in view.of(case).items():
-            for target in TARGETS if line["timed"].any() else ():
+            for target in TARGETS if any(rung["timed"] for rung in line) else ():
                 rung = time_to(line, target)
                 row: dict[str, Any] = {"case": case, "policy": policy, "target": target}
-                if rung is None or np.isnan(rung["cost"]):
-                    ok = bool((line["state"] == "ok").any())
-                    row |= {"ms": None, "why": "not reached" if ok else str(line.iloc[0]["state"])}
+                if rung is None or math.isnan(rung["cost"]):
+                    row |= {"ms": None, "why": "not reached" if ran(line) else str(line[0]["state"])}
                 else:
                     row |= {"ms": float(rung["cost"]), "step": str(rung["step_text"])}
-                    row |= {name: float(rung[name]) for name in ("low", "high") if not np.isnan(rung[name])}
+                    row |= {name: float(rung[name]) for name in ("low", "high") if not math.isnan(rung[name])}
                 found.append(row)
     return found
 
