@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shlex
+from pathlib import Path
 
 import altair as alt
+import pytest
 from click.testing import CliRunner
 from impactbench.reports import charts, charts_plain, page, page_failures, page_scores
 from impactbench.reports.cli import main
@@ -108,3 +110,21 @@ def test_charts_are_filled_copies_of_one_description_that_keeps_to_the_schema() 
     assert ["limits" in spec["datasets"] for spec in specs] == [True, False, False, False]
     assert specs[1] == specs[3]  # what went into a chart does not stay for the next
     assert all("datasets" not in make(view.style) for make in (charts.speed_layers, charts_plain.order_layers))
+
+
+def test_the_scripts_of_the_charts_are_made_once_for_an_installation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    monkeypatch.setattr(page.vl_convert, "javascript_bundle", lambda snippet: made.append(snippet) or "a</script>é")
+    monkeypatch.setattr(page, "KEPT", tmp_path / "kept")
+    texts = [page.bundle.__wrapped__() for _ in range(2)]
+    assert texts == ["a<\\/script>é"] * 2
+    assert len(made) == 1
+    (kept,) = (tmp_path / "kept").iterdir()
+    kept.write_bytes(b"\xff")  # not what was written: made again
+    assert page.bundle.__wrapped__() == texts[0]
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(page, "KEPT", tmp_path / "file")  # nothing can be kept there
+    assert page.bundle.__wrapped__() == texts[0]
+    assert len(made) == 3
