@@ -19,7 +19,7 @@ from impactbench.scenarios.truth import Case, Truth
 STEP = 2.0**-8
 COUNT = 32
 """Steps of a run [s]; every sample is one of those at which errors are taken."""
-TIMES: Floats = np.arange(COUNT + 1) * STEP
+TIMES: Floats = np.arange(COUNT + 1, dtype=np.float64) * np.float64(STEP)
 END = COUNT * STEP
 HIT = 10.5 * STEP
 """Impacts lie in the middle of a step [s]."""
