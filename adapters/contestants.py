@@ -92,6 +92,9 @@ def _policy(engine: str, profile: str) -> Contestant:
 _PROFILES = tuple(
     _policy(engine, profile)
     for engine, profile in (
+        ("reference", "revert"),
+        ("reference", "force"),
+        ("reference", "positions"),
         ("pybullet", "iterations"),
         ("pybullet", "swept"),
         ("pybullet", "maximal"),

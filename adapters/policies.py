@@ -91,6 +91,9 @@ SETTINGS: dict[str, tuple[Setting, ...]] = {
 
 SOURCES = {
     "reference/stepped": "rules of the documents; semi-implicit steps, impacts at the first overlapping step",
+    "reference/revert": "documents, rule R4: overlapping bodies go back to where the step began",
+    "reference/force": "documents, rule R5: viscous friction as an explicit force, refused where it would reverse",
+    "reference/positions": "documents, rule R4: projections also change velocities, close to an inelastic impact",
     "reference/exact": "rules of the documents, from event to event; no step",
     "mujoco/default": "vendor's defaults (XML reference, option and geom): Euler, pyramidal cone, solref 0.02 1",
     "mujoco/tuned": "XML reference, solref: direct damping (1+e)/h answers an impact within one step; elliptic cone",

@@ -7,16 +7,24 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from impactbench.reference.callback import Callback, asked_to_leave, without
+from impactbench.reference.interlocked import refuse_interlocked
 from impactbench.reference.particles import build_bodies, build_pairs, check_supported
 from impactbench.reference.rigid_run import RigidBodies
 from impactbench.reference.stepped import SWEEPS, Rules, run, start
 from impactbench.reference.swarm_run import Gas, why_not
+from impactbench.reference.viscous import force_as_damping
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Law, Model, Scene
 from impactbench.scenarios.trajectory import State
 
-STRATEGIES = {"stepped": "project", "revert": "revert"}
-"""Profile -> strategy of R4."""
+PROFILES = {
+    "stepped": "project, viscous friction as damping",
+    "revert": "revert, viscous friction as damping",
+    "force": "project, viscous friction as an explicit force",
+    "positions": "project with velocities from positions, viscous friction as damping",
+}
+"""Which strategy of R4 and which friction of R5 each profile takes."""
 
 TOUCH, STILL = 1e-10, 1e-13
 """Gap that counts as touching and speed that counts as none, next to the scene's length and speed."""
@@ -39,16 +47,17 @@ class Stepped:
         strategy = strategy_of(profile)
         self._runner: Gas | AllPairs | RigidBodies
         if scene.model.rotation:
-            if strategy == "revert":
-                raise Unsupported("the strategy revert is the particles'; this scene needs rotation")
+            if profile != "stepped":
+                raise Unsupported(f"the profile {profile} is the particles'; this scene needs rotation")
             self._runner = RigidBodies(scene, law, model, float(step))
+            refuse_interlocked(scene)
             self.settings = {"law": law, "strategy": strategy, "axes": model.axes, **self._runner.settings}
             return
         check_supported(scene, law, model)
-        if strategy == "project" and len(scene.movable) > LARGE and not why_not(scene, law, model):
+        if profile == "stepped" and len(scene.movable) > LARGE and not why_not(scene, law, model):
             self._runner = Gas(scene, model, step)
         else:
-            self._runner = AllPairs(scene, law, strategy, model, step)
+            self._runner = AllPairs(scene, law, profile, model, step)
         self.settings = {"law": law, "strategy": strategy, "axes": model.axes, **self._runner.settings}
 
     def advance(self, steps: int) -> None:
@@ -56,6 +65,14 @@ class Stepped:
 
     def read(self) -> State:
         return self._runner.read()
+
+    def on_contact(self, callback: Callback) -> None:
+        """Call `callback` after every step for each pair that touched in it (documents, rule R3); never needed by the
+        physics. The bodies it names leave then; `read` gives the others, in the scene's order. Particles only.
+        """
+        if not isinstance(self._runner, AllPairs):
+            raise Unsupported("contacts are reported by the runner of up to 64 particles only")
+        self._runner.on_contact(callback)
 
     def figures(self) -> Mapping[str, float]:
         """What the fast runner counts inside its steps; empty for the other."""
@@ -68,9 +85,15 @@ class Stepped:
 class AllPairs:
     """Every handled pair is looked at in every step: any scene of particles, a few bodies."""
 
-    def __init__(self, scene: Scene, law: Law, strategy: str, model: Model, step: float) -> None:
+    def __init__(self, scene: Scene, law: Law, profile: str, model: Model, step: float) -> None:
+        strategy = strategy_of(profile)
         self._name, self._done = scene.name, 0
         self._bodies, self._pairs = build_bodies(scene), build_pairs(scene)
+        refuse_interlocked(scene)
+        self._names = [body.name for body in scene.bodies]
+        self._callback: Callback | None = None
+        if profile == "force" and law == "doc":
+            force_as_damping(scene.name, self._bodies, self._pairs, step)
         self._movable = np.array(scene.movable, dtype=np.int64)
         self._rules = Rules(
             step=float(step),
@@ -78,18 +101,36 @@ class AllPairs:
             carried=np.array([1.0 if axis in model.axes else 0.0 for axis in range(3)]),
             doc=law == "doc",
             revert=strategy == "revert",
+            positions=profile == "positions",
             touch=TOUCH * scene.length,
             still=STILL * scene.speed,
         )
         self.settings: Mapping[str, object] = {
             "order": "detect, impacts, gravity, lasting contacts and friction, move, " + strategy,
+            "options": PROFILES[profile],
             "touching gap [m]": self._rules.touch,
             "negligible speed [m/s]": self._rules.still,
             "sweeps at most": SWEEPS,
         }
         start(self._bodies, self._pairs, self._rules)
 
+    def on_contact(self, callback: Callback) -> None:
+        self._callback = callback
+
     def advance(self, steps: int) -> None:
+        if self._callback is None:
+            self._run(steps)
+            return
+        for _ in range(steps):
+            self._run(1)
+            time = self._done * self._rules.step
+            leaving = asked_to_leave(self._callback, time, self._names, self._pairs)
+            if leaving:
+                self._bodies, self._pairs, kept = without(self._bodies, self._pairs, leaving)
+                self._names = [self._names[i] for i in kept]
+                self._movable = np.nonzero(self._bodies.inverse_mass > 0)[0]
+
+    def _run(self, steps: int) -> None:
         done = run(self._bodies, self._pairs, self._rules, steps)
         self._done += done
         if done < steps:
@@ -101,9 +142,9 @@ class AllPairs:
 
 
 def strategy_of(profile: str) -> str:
-    """The strategy a profile stands for."""
-    if profile not in STRATEGIES:
-        near = difflib.get_close_matches(profile, STRATEGIES, n=1)
+    """The strategy of R4 a profile stands for."""
+    if profile not in PROFILES:
+        near = difflib.get_close_matches(profile, PROFILES, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(f"unknown profile {profile!r}: one of {', '.join(STRATEGIES)}{hint}")
-    return STRATEGIES[profile]
+        raise ValueError(f"unknown profile {profile!r}: one of {', '.join(PROFILES)}{hint}")
+    return "revert" if profile == "revert" else "project"

@@ -29,8 +29,8 @@ class Rules(NamedTuple):
     """How to step: `step` [s], `gravity` [m/s^2], `carried` 1 on the axes that carry motion else 0, the law and the
     strategy of R4.
 
-    touch [m]: gap up to which bodies touch. still [m/s]: a speed that counts as none. Both are round-off next to the
-    scene.
+    positions: a projection also changes velocities. touch [m]: gap up to which bodies touch. still [m/s]: a speed that
+    counts as none. The last two are round-off next to the scene.
     """
 
     step: float
@@ -38,6 +38,7 @@ class Rules(NamedTuple):
     carried: Floats
     doc: bool
     revert: bool
+    positions: bool
     touch: float
     still: float
 
@@ -177,7 +178,10 @@ def separate(bodies: Bodies, pairs: Pairs, near: Indices, rules: Rules) -> bool:
             p = near[i] if sweep % 2 == 0 else near[len(near) - 1 - i]
             locate(bodies, pairs, p)
             if pairs.gap[p] < -rules.touch / 2:
+                depth = -pairs.gap[p]
                 part(bodies, pairs, p, rules.gravity)
+                if rules.positions:
+                    follow(bodies, pairs, p, depth / rules.step)
                 clear = False
         if clear:
             return True
@@ -209,6 +213,18 @@ def part(bodies: Bodies, pairs: Pairs, p: int, gravity: Floats) -> None:
     upper = b if w_a == 0 or pull > 0 else a
     bodies.debt[a] = bodies.debt[b] = 0.0
     bodies.debt[upper] = max(0.0, cost - mass * (approach * approach - touched * touched) / 2)
+
+
+@compiled
+def follow(bodies: Bodies, pairs: Pairs, p: int, speed: float) -> None:
+    """Velocities from positions (documents, rule R4): what projection moved pair p by, per step, off its approach.
+
+    Never more than the approach, so it takes energy and adds none; the impact that follows finds less to return.
+    """
+    n, approach = pairs.normal[p], max(0.0, -relative(bodies, pairs, p)[0])
+    a, b = pairs.first[p], pairs.second[p]
+    blow = min(approach, speed) / (bodies.inverse_mass[a] + bodies.inverse_mass[b])
+    exchange(bodies, pairs, p, blow * n[0], blow * n[1], blow * n[2])
 
 
 @compiled

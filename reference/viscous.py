@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from impactbench.reference.impact import Velocities, apply_impulse, reduced_mass, split
+from impactbench.reference.particles import Bodies, Pairs
 from impactbench.scenarios.trajectory import Floats
 
 
@@ -34,6 +35,18 @@ def damping_step(tangential: Floats, rate: float, step: float) -> Floats:
     The exact solution of the same force, so both implementations agree as the step shrinks.
     """
     return tangential * math.exp(-rate * step)
+
+
+def force_as_damping(scene: str, bodies: Bodies, pairs: Pairs, step: float) -> None:
+    """Replace every c by the one whose damping over `step` is the explicit force's: exp(-c' h/mu_r) = 1 - c h/mu_r.
+
+    Raises ValueError where c h/mu_r > 1 (see `force_step`).
+    """
+    for p, c in enumerate(pairs.viscosity):
+        ratio = c * step * (bodies.inverse_mass[pairs.first[p]] + bodies.inverse_mass[pairs.second[p]])
+        if ratio > 1:
+            raise ValueError(f"{scene}: c h/m = {ratio:.3g} > 1: as a force, viscosity {c:g} would reverse the sliding")
+        pairs.viscosity[p] = math.inf if ratio == 1 else -math.log1p(-ratio) * c / ratio if ratio > 0 else 0.0
 
 
 def distance(speed: float, rate: float, time: float) -> float:

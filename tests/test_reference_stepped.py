@@ -315,5 +315,5 @@ def test_a_bad_step_is_refused(step):
 
 
 def test_an_unknown_profile_names_the_known_ones():
-    with pytest.raises(ValueError, match=r"stepped, revert; did you mean 'revert'"):
+    with pytest.raises(ValueError, match=r"stepped, revert, force, positions; did you mean 'revert'"):
         engine(scene([ball("ball", (0, 0, 1))]), profile="reverts")

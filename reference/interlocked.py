@@ -1,0 +1,36 @@
+"""Bodies that start inside static ones are refused: no projection knows which way is out."""
+
+from __future__ import annotations
+
+from impactbench.reference.triples import back, dot, length, matrix, plus, subtract
+from impactbench.scenarios.records import Body, Box, Capsule, HalfSpace, Scene, Sphere, Vector
+
+MARGIN = 1e-9
+"""Next to the scene's length: a centre this close to the surface is on it."""
+
+
+def refuse_interlocked(scene: Scene) -> None:
+    """Raise ValueError for a movable body whose centre starts within a static one."""
+    if not scene.collide:
+        return
+    for static in (scene.bodies[i] for i in scene.statics):
+        for body in (scene.bodies[i] for i in scene.movable):
+            if depth(static, body.position) > MARGIN * scene.length:
+                where = f"position {body.position} lies inside the static body {static.name!r}"
+                raise ValueError(f"body {body.name!r}: {where}")
+
+
+def depth(static: Body, point: Vector) -> float:
+    """How far [m] a point lies below the body's surface; negative outside (there no more than a sign)."""
+    away = subtract(point, static.position)
+    if isinstance(static.shape, HalfSpace):
+        return -dot(away, static.shape.normal)
+    own = back(matrix(static.orientation), away)
+    match static.shape:
+        case Sphere(radius):
+            return radius - length(own)
+        case Box(half):
+            return min(h - abs(x) for h, x in zip(half, own, strict=True))
+        case Capsule(radius, half_length):
+            along = min(half_length, max(-half_length, own[2]))
+            return radius - length(plus(own, -along, (0.0, 0.0, 1.0)))
