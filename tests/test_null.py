@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
+from impactbench.reports import page
 from impactbench.reports.null import floor, limits_of
 from impactbench.scenarios.catalogue import select
 from impactbench.scenarios.crowds import gas
 from impactbench.scenarios.truth import Case, Truth
+from test_page import Maker, case, document, specs
 
 
 def case_of(name: str) -> Case:
@@ -31,8 +35,8 @@ def test_a_ball_that_passes_through_the_wall_is_off_by_both_ways() -> None:
 
 
 def test_every_case_of_the_catalogue_has_its_floor_below_what_is_asked_for() -> None:
-    for case in select([]):
-        found = limits_of(case)
+    for found_case in select([]):
+        found = limits_of(found_case)
         assert 0 < found["floor"] < 1e-10
         assert all(value >= 0 for value in found.get("null", {}).values())
 
@@ -42,3 +46,14 @@ def test_a_crowd_costs_nothing_and_has_no_null_model() -> None:
     case = Case(scene, dict.fromkeys(scene.laws, Truth("invariant", lambda _: None)), "energy_drift")
     assert set(limits_of(case)) == {"floor"}
     assert floor(case) == pytest.approx(10 * 960 * 2.0**-53)
+
+
+def test_the_chart_shows_them_as_named_lines() -> None:
+    maker = Maker()
+    maker.ladder("a", "x/y", 0.1, 1e-3)
+    described = case("a", "a") | {"null": {"frozen": 0.5, "no contact": 0.0}, "floor": 2e-10}
+    (spec,) = (json.loads(spec) for spec in specs(page.render(document(maker, [described]))))
+    rows = [row for rows in spec["datasets"].values() for row in rows]
+    named = {(row["x"], row["t"]) for row in rows if "t" in row}
+    assert {(0.5, "frozen"), (2e-10, "round-off")} <= named
+    assert "no contact" not in {text for _, text in named}
