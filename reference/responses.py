@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import math
 
-from impactbench.reference.compiled import compiled
+import numpy as np
+from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.particles import Bodies, Indices, Pairs
 from impactbench.reference.pushes import Holds, hold_all
 from impactbench.scenarios.trajectory import Floats
 
+BETWEEN = 25
+"""Sweeps with friction from one solution of the pushes alone to the next."""
 
-@compiled
+
+@inlined
 def relative(bodies: Bodies, pairs: Pairs, p: int) -> tuple[float, float, float, float]:
     """u . n and the tangential part u_p = u - (u . n) n [m/s] of pair p."""
     v_a, v_b, n = bodies.velocity[pairs.first[p]], bodies.velocity[pairs.second[p]], pairs.normal[p]
@@ -23,14 +27,14 @@ def relative(bodies: Bodies, pairs: Pairs, p: int) -> tuple[float, float, float,
     return along, x - along * n[0], y - along * n[1], z - along * n[2]
 
 
-@compiled
+@inlined
 def reduced(bodies: Bodies, pairs: Pairs, p: int) -> float:
     """mu_r [kg] of pair p; the movable's mass if the other is static."""
     inverse: float = bodies.inverse_mass[pairs.first[p]] + bodies.inverse_mass[pairs.second[p]]
     return 1 / inverse
 
 
-@compiled
+@inlined
 def exchange(bodies: Bodies, pairs: Pairs, p: int, x: float, y: float, z: float) -> None:
     """Give the impulse (x, y, z) [N s] to the second body and its opposite to the first (documents, rule R6)."""
     a, b = pairs.first[p], pairs.second[p]
@@ -44,7 +48,7 @@ def exchange(bodies: Bodies, pairs: Pairs, p: int, x: float, y: float, z: float)
     v_b[2] += w_b * z
 
 
-@compiled
+@inlined
 def strike(bodies: Bodies, pairs: Pairs, p: int, doc: bool) -> None:
     """One impact. `doc`: u' = b (u - 2 (u . n) n) (documents, rule R9); else Newton on the normal, Coulomb in the
     plane.
@@ -94,17 +98,19 @@ def hold(bodies: Bodies, pairs: Pairs, active: Indices, rubbing: bool, tolerance
     from `push`.
 
     With `rubbing`, lasting contacts also get Coulomb friction within mu times their own sum. Ends once no sweep
-    changes a velocity by more than `tolerance` [m/s], or after `sweeps`; returns the last change [m/s]. Without it,
-    `pushes` solves tall columns and unlike masses in far fewer.
+    changes a velocity by more than `tolerance` [m/s], or after `sweeps`; returns the last change [m/s]. `pushes` solves
+    the normal part of tall columns and unlike masses first and every `BETWEEN` sweeps; without friction, that is all.
     """
     for p in active:
         n, push = pairs.normal[p], pairs.push[p]
         exchange(bodies, pairs, p, push * n[0], push * n[1], push * n[2])
         pairs.rub[p] = 0.0
-    if not rubbing:
+    if not (rubbing and pairs.friction[active].any()):
         return press_all(bodies, pairs, active, tolerance)
     worst = 0.0
     for sweep in range(sweeps):
+        if sweep % BETWEEN == 0:
+            press_all(bodies, pairs, active, tolerance)
         worst = 0.0
         for i in range(len(active)):
             # Up and down in turn: a blow crosses a column either way in one sweep.
@@ -122,13 +128,13 @@ def press_all(bodies: Bodies, pairs: Pairs, active: Indices, tolerance: float) -
     """Hold the contacts `active` without friction. Returns the last change of velocity [m/s]."""
     first, second = pairs.first[active], pairs.second[active]
     mass = 1 / (bodies.inverse_mass[first] + bodies.inverse_mass[second])
-    holds = Holds(first, second, pairs.normal[active], pairs.push[active], mass)
+    holds = Holds(first, second, pairs.normal[active], pairs.push[active], mass, np.zeros(len(active)))
     worst = hold_all(bodies.velocity, bodies.inverse_mass, holds, tolerance)
     pairs.push[active] = holds.push
     return worst
 
 
-@compiled
+@inlined
 def press(bodies: Bodies, pairs: Pairs, p: int) -> float:
     """Bring the normal part of u to 0 as far as a push, never a pull, can. Returns the change of velocity [m/s]."""
     along, _, _, _ = relative(bodies, pairs, p)
@@ -140,7 +146,7 @@ def press(bodies: Bodies, pairs: Pairs, p: int) -> float:
     return abs(more) / mass
 
 
-@compiled
+@inlined
 def grip(bodies: Bodies, pairs: Pairs, p: int) -> float:
     """Coulomb friction: stop the sliding with an impulse of at most mu times the push. Returns the change of velocity
     [m/s].

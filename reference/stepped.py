@@ -3,9 +3,9 @@ keep apart.
 
 Choices that the documents leave open, made so that energy never grows:
 - Positions move by the mean of the velocities before and after the step's forces: free flight is the exact parabola.
-- A body found d deep in a static one is lifted by d and its approach reduced to the speed it had when it touched
-  (`penetration.touching_speed`), so the lift adds nothing. What a slower body cannot pay of m a d is kept as its debt
-  and taken from the next approach: the energy never exceeds its start by more than the debt.
+- Overlaps are taken back all at once, and bodies that touch one another pay for the lift out of their approach
+  (`projection`). What they cannot pay of m a d is kept as their debt and taken from the next approach: the energy never
+  exceeds its start by more than the debt.
 - A contact slower than gravity explains is lasting: 2 h |g . n|, since gravity does not push bodies sideways.
 """
 
@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from impactbench.reference.compiled import compiled
-from impactbench.reference.gaps import locate
+from impactbench.reference.gaps import locate, look
 from impactbench.reference.particles import Bodies, Indices, Pairs
-from impactbench.reference.responses import damp, exchange, hold, relative, resolve_impacts
+from impactbench.reference.projection import follow, project
+from impactbench.reference.responses import damp, hold, relative, resolve_impacts
 from impactbench.scenarios.trajectory import Floats
 
 SWEEPS = 500
@@ -91,7 +92,9 @@ def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
     if rules.revert:
         revert(bodies, pairs, rules, last, before, slow)
     else:
-        project(bodies, pairs, rules)
+        parted = project(bodies, pairs, rules.gravity, rules.touch, rules.still)
+        if rules.positions:
+            follow(bodies, pairs, parted / rules.step)
     # What is left after all sweeps is harmless below the speed that a contact may have anyway: the next step goes on
     # from there.
     return rest <= max(rules.still, 2 * rules.step * math.sqrt((rules.gravity**2).sum()))
@@ -106,29 +109,6 @@ def detect(bodies: Bodies, pairs: Pairs, touch: float) -> Indices:
         if not pairs.touching[p]:
             pairs.reach[p] = 0.0
     return np.nonzero(pairs.touching)[0]
-
-
-@compiled
-def look(bodies: Bodies, pairs: Pairs, touch: float) -> None:
-    """Bring the gaps up to date; of pairs that cannot have met since they were seen apart, to a lower bound above
-    `touch`.
-    """
-    travel = 0.0
-    for i in range(len(bodies.inverse_mass)):
-        x = bodies.position[i, 0] - bodies.seen[i, 0]
-        y = bodies.position[i, 1] - bodies.seen[i, 1]
-        z = bodies.position[i, 2] - bodies.seen[i, 2]
-        travel = max(travel, x * x + y * y + z * z)
-    bodies.seen[:] = bodies.position
-    # Sums of travels lose some of their last digits: a little more keeps the bound sure.
-    pairs.odometer[0] += 2 * math.sqrt(travel) * (1 + 1e-9)
-    now, gap, clear, reach = pairs.odometer[0], pairs.gap, pairs.clear, pairs.reach
-    for p in range(len(gap)):
-        if clear[p] - now > 2 * touch and reach[p] == 0.0:
-            gap[p] = clear[p] - now
-        else:
-            locate(bodies, pairs, p)
-            clear[p] = now + gap[p]
 
 
 @compiled
@@ -148,83 +128,6 @@ def parting(bodies: Bodies, pairs: Pairs, active: Indices) -> Floats:
     for i in range(len(active)):
         speeds[i] = relative(bodies, pairs, active[i])[0]
     return speeds
-
-
-@compiled
-def project(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
-    """Move overlapping bodies apart, shared by mass (documents, rule R4), pair after pair until no overlap is left.
-
-    Sweeps visit the pairs that overlap or soon could; a last look at all pairs finds the others. A heap that needs
-    more than `SWEEPS` keeps its rest of overlap for the next step.
-    """
-    for _ in range(len(bodies.inverse_mass)):
-        look(bodies, pairs, rules.touch)
-        deepest = 0.0
-        for p in range(len(pairs.first)):
-            deepest = max(deepest, -pairs.gap[p])
-        if deepest <= rules.touch / 2:
-            return
-        near = np.nonzero(pairs.gap < 4 * deepest)[0]
-        if not separate(bodies, pairs, near, rules):
-            return
-
-
-@compiled
-def separate(bodies: Bodies, pairs: Pairs, near: Indices, rules: Rules) -> bool:
-    """Sweep over the pairs `near` until none overlaps. Returns whether that was reached."""
-    for sweep in range(SWEEPS):
-        clear = True
-        for i in range(len(near)):
-            p = near[i] if sweep % 2 == 0 else near[len(near) - 1 - i]
-            locate(bodies, pairs, p)
-            if pairs.gap[p] < -rules.touch / 2:
-                depth = -pairs.gap[p]
-                part(bodies, pairs, p, rules.gravity)
-                if rules.positions:
-                    follow(bodies, pairs, p, depth / rules.step)
-                clear = False
-        if clear:
-            return True
-    return False
-
-
-@compiled
-def part(bodies: Bodies, pairs: Pairs, p: int, gravity: Floats) -> None:
-    """Take pair p apart along its normal and let its approach pay for what that adds to the energy.
-
-    The common centre of two movable bodies stays, which costs nothing; a lift off a static body costs m a d. What the
-    approach cannot pay waits on the upper body for a contact that can: in a column, the blow comes from above.
-    """
-    a, b, n, depth = pairs.first[p], pairs.second[p], pairs.normal[p], -pairs.gap[p]
-    w_a, w_b = bodies.inverse_mass[a], bodies.inverse_mass[b]
-    for k in range(3):
-        bodies.position[a, k] -= depth * w_a / (w_a + w_b) * n[k]
-        bodies.position[b, k] += depth * w_b / (w_a + w_b) * n[k]
-    pull = -(gravity[0] * n[0] + gravity[1] * n[1] + gravity[2] * n[2])
-    cost = bodies.debt[a] + bodies.debt[b]
-    if w_a == 0:
-        cost += pull * depth / w_b
-    approach, mass = max(0.0, -relative(bodies, pairs, p)[0]), 1 / (w_a + w_b)
-    if cost == 0:
-        return
-    touched = math.sqrt(max(0.0, approach * approach - 2 * cost / mass)) if approach > 0 else 0.0
-    blow = mass * (approach - touched)
-    exchange(bodies, pairs, p, blow * n[0], blow * n[1], blow * n[2])
-    upper = b if w_a == 0 or pull > 0 else a
-    bodies.debt[a] = bodies.debt[b] = 0.0
-    bodies.debt[upper] = max(0.0, cost - mass * (approach * approach - touched * touched) / 2)
-
-
-@compiled
-def follow(bodies: Bodies, pairs: Pairs, p: int, speed: float) -> None:
-    """Velocities from positions (documents, rule R4): what projection moved pair p by, per step, off its approach.
-
-    Never more than the approach, so it takes energy and adds none; the impact that follows finds less to return.
-    """
-    n, approach = pairs.normal[p], max(0.0, -relative(bodies, pairs, p)[0])
-    a, b = pairs.first[p], pairs.second[p]
-    blow = min(approach, speed) / (bodies.inverse_mass[a] + bodies.inverse_mass[b])
-    exchange(bodies, pairs, p, blow * n[0], blow * n[1], blow * n[2])
 
 
 @compiled

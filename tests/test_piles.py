@@ -15,8 +15,8 @@ from impactbench.scenarios.crowds import column, wall
 STEP = 1 / 240
 
 
-def settled(scene, steps, parts=20):
-    """The state at the end, and the total energy [J] at the start and at each of the parts' ends."""
+def settled(scene, steps):
+    """The state at the end, and the total energy [J] at the start and after each step."""
     run = Stepped(scene, "doc", "stepped", scene.model, STEP)
     mass = np.array([scene.bodies[i].mass for i in scene.movable])
 
@@ -25,8 +25,8 @@ def settled(scene, steps, parts=20):
         return float(mass @ ((state.velocities**2).sum(axis=1) / 2 - state.positions @ np.array(scene.gravity)))
 
     found = [energy()]
-    for _ in range(parts):
-        run.advance(steps // parts)
+    for _ in range(steps):
+        run.advance(1)
         found.append(energy())
     return run.read(), np.array(found)
 
@@ -37,16 +37,19 @@ def settled(scene, steps, parts=20):
         (column(10), np.arange(10), 480),
         (column(100, 1e-4), np.arange(100), 480),
         (column(2, masses=[1.0, 1e4]), np.arange(2), 480),
+        (column(2, masses=[1.0, 1e6]), np.arange(2), 480),
         (wall(10, 10), np.repeat(np.arange(10), 10), 480),
+        (wall(2, 100), np.repeat(np.arange(100), 2), 480),
+        (wall(10, 100, 1e-4), np.repeat(np.arange(100), 10), 60),
     ],
-    ids=["column of 10", "column of 100", "1e4 on 1", "wall 10 x 10"],
+    ids=["column of 10", "column of 100", "1e4 on 1", "1e6 on 1", "wall 10 x 10", "wall 2 x 100", "wall 10 x 100"],
 )
 def test_piles_come_to_rest_at_exact_heights(scene, rows, steps):
     state, energy = settled(scene, steps)
     assert np.abs(state.positions[:, 2] - (rows + 0.5)).max() <= 1e-6
     assert np.abs(state.velocities).max() <= 1e-9
-    # What the fall gave is gone, and at no time was there more than at the start.
-    assert energy.max() <= energy[0] * (1 + 1e-13)
+    # What the fall gave is gone, and no step added any: round-off of a sum of a thousand terms.
+    assert np.diff(energy).max() <= 1e-13 * energy[0]
     assert energy[-1] < energy[0]
 
 
@@ -66,7 +69,9 @@ def test_pushes_solve_the_complementarity_problem(seed, bodies, spread):
     velocity = rng.normal(size=(bodies + 1, 3))
     velocity[0] = 0.0
     before = velocity.copy()
-    holds = Holds(first, second, normal, np.zeros(len(pairs)), 1 / (inverse[first] + inverse[second]))
+    holds = Holds(
+        first, second, normal, np.zeros(len(pairs)), 1 / (inverse[first] + inverse[second]), np.zeros(len(pairs))
+    )
     assert hold_all(velocity, inverse, holds, 1e-13) <= 1e-13
     speed = ((velocity[second] - velocity[first]) * normal).sum(axis=1)
     assert holds.push.min() >= 0
