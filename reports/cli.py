@@ -17,6 +17,7 @@ from impactbench.reports.cli_limits import limits
 from impactbench.reports.cli_metamorphic import metamorphic
 from impactbench.reports.cli_predictability import predictability
 from impactbench.reports.cli_report import diff, report
+from impactbench.reports.cli_routes import routes
 from impactbench.reports.cli_sweep import Sweep, export, sweep_options
 from impactbench.reports.options import OneLineErrors, cases_of, contestants_of, progress_bar, steps_of, writable_folder
 
@@ -281,6 +282,7 @@ main.add_command(explain)
 main.add_command(limits)
 main.add_command(metamorphic)
 main.add_command(predictability)
+main.add_command(routes)
 main.add_command(export)
 main.add_command(report)
 main.add_command(diff)

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from impactbench.scenarios import scene_defaults
+from impactbench.scenarios.materials import MIXINGS, mixed
 from impactbench.scenarios.records import (
     UPRIGHT,
     ZERO,
@@ -59,13 +60,15 @@ SHAPE_KEYS = {
     "capsule": ("radius", "half_length"),
     "plane": ("normal",),
 }
-PLACE_KEYS = ("name", "shape", "position")
+PLACE_KEYS = ("name", "shape", "position", "bounciness")
 BODY_KEYS = (*PLACE_KEYS, "orientation", "mass", "velocity", "spin", "inertia")
 CONTACT_KEYS = ("bounciness", "friction", "viscosity")
 SCENE_KEYS = (
-    *("name", "duration", "gravity", "measure", "laws", "axes", "rotation", "touching"),
+    *("name", "duration", "gravity", "measure", "laws", "axes", "rotation", "touching", "mixing"),
     *("scales", "contact", "bodies", "statics", "pairs"),
 )
+PairContacts = tuple[tuple[str, str, Contact], ...]
+MOST_MIXED = 300
 _DEEP_KEY = re.compile(r"(?:[^\s.=#,\[\]]{1,64}[ \t]{0,4}\.[ \t]{0,4}){32}")
 """A key of very many parts takes the parser quadratic time."""
 
@@ -164,7 +167,7 @@ def _syntax(file: str, text: str, why: str) -> str:
 def _scene(top: Table, name: str) -> Scene:
     contact = _contact(top.table("contact"), Contact())
     bodies = _bodies(top)
-    pairs = _pairs(top, contact, bodies)
+    pairs = _mixed(top, contact, bodies, _pairs(top, contact, bodies))
     gravity = top.vector("gravity", ZERO)
     content = Content(bodies, gravity, _duration(top), (contact, *(own for _, _, own in pairs)))
     try:
@@ -300,7 +303,7 @@ def _contact(table: Table, base: Contact, more: tuple[str, ...] = ()) -> Contact
     )
 
 
-def _pairs(top: Table, base: Contact, bodies: tuple[Body, ...]) -> tuple[tuple[str, str, Contact], ...]:
+def _pairs(top: Table, base: Contact, bodies: tuple[Body, ...]) -> PairContacts:
     found: dict[frozenset[str], tuple[str, str, Contact]] = {}
     static = {body.name: body.static for body in bodies}
     for table in top.tables("pairs"):
@@ -310,6 +313,22 @@ def _pairs(top: Table, base: Contact, bodies: tuple[Body, ...]) -> tuple[tuple[s
             table.fail(f"the pair {shown(a)}, {shown(b)} is listed twice", "between")
         found[frozenset((a, b))] = (a, b, own)
     return tuple(found.values())
+
+
+def _mixed(top: Table, base: Contact, bodies: tuple[Body, ...], listed: PairContacts) -> PairContacts:
+    """Pairs of bodies with a bounciness of their own, by the file's mixing (documents, rule R10)."""
+    mixing = top.choice("mixing", tuple(MIXINGS), "average")
+    tables = [*top.tables("bodies"), *top.tables("statics")]
+    own = {
+        body.name: table.between("bounciness", base.bounciness, 0, 1)
+        for table, body in zip(tables, bodies, strict=True)
+        if "bounciness" in table.values
+    }
+    if own and len(bodies) > MOST_MIXED:
+        top.fail(
+            f"{len(bodies)} bodies; those with a bounciness of their own are paired in scenes of up to {MOST_MIXED}"
+        )
+    return mixed(bodies, own, mixing, base, listed)
 
 
 def _two_names(table: Table, static: dict[str, bool]) -> tuple[str, str]:
