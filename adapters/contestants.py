@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -44,10 +44,7 @@ class Contestant:
         return self.engine
 
     def version(self) -> str | None:
-        try:
-            return importlib.metadata.version(self.distribution) if self.distribution else None
-        except importlib.metadata.PackageNotFoundError:
-            return None
+        return _version(self.distribution) if self.distribution else None
 
     def availability(self) -> str:
         """Empty, or why it cannot run here; from metadata alone, so that a broken engine cannot break the question."""
@@ -63,6 +60,14 @@ class Contestant:
             return cast(type[Engine], partial(_configured, kind, dict(self.options)) if self.options else kind)
         except (ImportError, OSError, AttributeError) as fault:  # OSError: a shared library that does not load
             raise Unavailable(self.availability() or f"{self.name} cannot be loaded: {fault}") from fault
+
+
+@cache  # reading it takes a millisecond, and every cell asks
+def _version(distribution: str) -> str | None:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return None
 
 
 def _configured(kind: Any, options: dict[str, policies.Value], *scene_and_step: Any) -> Engine:

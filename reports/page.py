@@ -6,11 +6,13 @@ A rung is one (case, policy, step); its error is that of the worst impact phase.
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import functools
 import importlib.metadata
 import json
 import re
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -45,19 +47,22 @@ def render(document: dict[str, Any]) -> str:
 
 
 @functools.cache
-def bundle() -> Markup:
-    """Vega, Vega-Lite and Vega-Embed as one script, from the installed vl-convert.
+def bundle() -> str:
+    """Vega, Vega-Lite and Vega-Embed from the installed vl-convert as one script, deflated, in base64.
 
     Kept where compiled Python is, since making it takes as long as drawing half of the charts.
     """
-    kept = KEPT / f"vega-{importlib.metadata.version('vl-convert-python')}.js"
-    with contextlib.suppress(OSError, UnicodeDecodeError):
-        return Markup(kept.read_bytes().decode())
-    script = str(vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;")).replace("</script", "<\\/script")
+    kept = KEPT / f"vega-{importlib.metadata.version('vl-convert-python')}.txt"
+    with contextlib.suppress(OSError, ValueError, zlib.error):
+        packed = kept.read_text("ascii")
+        zlib.decompress(base64.b64decode(packed, validate=True))  # whole, or made again
+        return packed
+    script = str(vl_convert.javascript_bundle("window.vegaLibrary = vegaEmbed;"))
+    packed = base64.b64encode(zlib.compress(script.encode(), 9)).decode()
     with contextlib.suppress(OSError):  # an installation nobody may write to
         KEPT.mkdir(exist_ok=True)
-        results.write_text(kept, script)
-    return Markup(script)
+        results.write_text(kept, packed)
+    return packed
 
 
 def environment() -> jinja2.Environment:

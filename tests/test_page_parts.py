@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import shlex
+import zlib
 from pathlib import Path
 
 import altair as alt
@@ -119,7 +121,7 @@ def test_the_scripts_of_the_charts_are_made_once_for_an_installation(
     monkeypatch.setattr(page.vl_convert, "javascript_bundle", lambda snippet: made.append(snippet) or "a</script>é")
     monkeypatch.setattr(page, "KEPT", tmp_path / "kept")
     texts = [page.bundle.__wrapped__() for _ in range(2)]
-    assert texts == ["a<\\/script>é"] * 2
+    assert [zlib.decompress(base64.b64decode(text)).decode() for text in texts] == ["a</script>é"] * 2
     assert len(made) == 1
     (kept,) = (tmp_path / "kept").iterdir()
     kept.write_bytes(b"\xff")  # not what was written: made again
