@@ -34,7 +34,7 @@ layers: $(STAMP)
 	PYTHONPATH=$(LINKS) $(BIN)/lint-imports --no-cache
 
 tests: $(STAMP)
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 # Seeded faults of laws, adapters and measures: which of them the gate catches. Some minutes.
 mutants: $(STAMP)

@@ -319,11 +319,13 @@ def test_an_output_that_is_full_is_one_line() -> None:
 @pytest.fixture
 def hanging(earlier: Path) -> Iterator[tuple[subprocess.Popen[str], list[int]]]:
     """A comparison into the folder of earlier results, at the moment its child is at work."""
-    words = [COMMAND, "compare", FLIGHT, "--engine", f"{FAKES}:Hanging", "--out", "out"]
+    words = [COMMAND, "compare", FLIGHT, "--engine", f"{FAKES}:Hanging", "--out", "out", "--jobs", "1"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
-        assert eventually(lambda: len(grandchildren(program.pid)) == 1, 30)
-        yield program, grandchildren(program.pid)
-        program.kill()
+        try:
+            assert eventually(lambda: len(grandchildren(program.pid)) == 1, 30)
+            yield program, grandchildren(program.pid)
+        finally:
+            program.kill()
 
 
 def test_ctrl_c_is_130_and_leaves_no_child(hanging: tuple[subprocess.Popen[str], list[int]], earlier: Path) -> None:
