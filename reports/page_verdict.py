@@ -129,4 +129,4 @@ def _most_often(view: View) -> str:
     if not len(below) or len(view.cases) < 2:
         return ""
     best = [policy for policy, count in below.items() if count == below.max()]
-    return f"Most cases: {listing(best, 3)}, {below.max()} of {len(view.cases)}."
+    return f"Engine with most cases: {listing(best, 3)}, {below.max()} of {len(view.cases)}."

@@ -139,7 +139,7 @@ def test_the_verdict_says_what_holds_what_fails_and_what_to_take() -> None:
     # Errors at the finest steps below 1 %: mujoco/tuned in both cases, pybullet/default 3.0 / 32**0.5 in none.
     assert take == (
         "reference/events for stacked drop: cheapest below 1 % error, 0.1 ms per simulated second; "
-        "among engines mujoco/tuned, 0.8. Most cases: mujoco/tuned, 2 of 2."
+        "among engines mujoco/tuned, 0.8. Engine with most cases: mujoco/tuned, 2 of 2."
     )
 
 
