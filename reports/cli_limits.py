@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import click
-from impactbench.reports.options import contestants_of, progress_bar, writable_folder
+from impactbench.reports.options import contestants_of, progress_bar, publish, writable_folder
 
 
 @click.command()
@@ -42,7 +42,7 @@ def limits(
     from dataclasses import replace
 
     from impactbench.reports import limits as search
-    from impactbench.reports import results, sections
+    from impactbench.reports import results
     from impactbench.reports.limits_view import text
     from impactbench.reports.probe_store import ProbeStore
 
@@ -56,16 +56,10 @@ def limits(
         with progress_bar() as progress:
             store = ProbeStore(folder / "limits.probes.jsonl")
             part = search.hunt(chosen, contestants, effort, jobs, store, progress, policies=not engines)
-        sections.attach(folder, "limits", part)
     except results.ResultsError as error:
         raise click.UsageError(str(error)) from None
     except OSError as error:
         raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
-    if as_json:
-        import json
-
-        click.echo(json.dumps(part, indent=1, allow_nan=False))
-    else:
-        click.echo(text(part))
+    publish(folder, "limits", part, as_json, text)
     if all(each["status"] == "unknown" for each in part["searches"]):
         raise click.exceptions.Exit(3)

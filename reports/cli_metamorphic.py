@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import click
-from impactbench.reports.options import cases_of, contestants_of, progress_bar, steps_of, writable_folder
+from impactbench.reports.options import cases_of, contestants_of, progress_bar, publish, steps_of, writable_folder
 
 
 @click.command()
@@ -42,21 +42,9 @@ def metamorphic(
     folder = writable_folder(out)
 
     from impactbench.reports import metamorphic as relations
-    from impactbench.reports import results, sections
 
     with progress_bar() as progress:
         part = relations.metamorphic(chosen, contestants, steps[0], jobs, progress)
-    try:
-        sections.attach(folder, "metamorphic", part)
-    except results.ResultsError as error:
-        raise click.UsageError(str(error)) from None
-    except OSError as error:
-        raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
-    if as_json:
-        import json
-
-        click.echo(json.dumps(part, indent=1, allow_nan=False))
-    else:
-        click.echo(relations.text(part))
+    publish(folder, "metamorphic", part, as_json, relations.text)
     if not any(trial["state"] == "ok" for trial in part["trials"]):
         raise click.exceptions.Exit(3)

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import click
-from impactbench.reports.options import cases_of, contestants_of, progress_bar, writable_folder
+from impactbench.reports.options import cases_of, contestants_of, progress_bar, publish, writable_folder
 
 
 @click.command()
@@ -25,23 +25,11 @@ def predictability(
     OUT/results.json stands. Exit code 3: nothing was measured.
     """
     from impactbench.reports import predictability_view as horizons
-    from impactbench.reports import results, sections
 
     chosen = cases_of(cases or horizons.DEFAULT)
     contestants, folder = contestants_of(engines, profile) if engines else (), writable_folder(out)
     with progress_bar() as progress:
         part = horizons.predict(chosen, contestants, jobs, progress)
-    try:
-        sections.attach(folder, "predictability", part)
-    except results.ResultsError as error:
-        raise click.UsageError(str(error)) from None
-    except OSError as error:
-        raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
-    if as_json:
-        import json
-
-        click.echo(json.dumps(part, indent=1, allow_nan=False))
-    else:
-        click.echo(horizons.text(part))
+    publish(folder, "predictability", part, as_json, horizons.text)
     if not any(row["state"] == "ok" for row in part["rows"]):
         raise click.exceptions.Exit(3)

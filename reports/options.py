@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,3 +114,21 @@ def progress_bar() -> Iterator[Progress]:
             bar.update(task, completed=done)
 
         yield show
+
+
+def publish(folder: Path, key: str, part: dict[str, Any], as_json: bool, text: Callable[[dict[str, Any]], str]) -> None:
+    """Write a measured part to OUT/<key>.json and into the report beside it, and print it."""
+    from impactbench.reports import results, sections
+
+    try:
+        sections.attach(folder, key, part)
+    except results.ResultsError as error:
+        raise click.UsageError(str(error)) from None
+    except OSError as error:
+        raise click.UsageError(f"cannot write to {folder}: {error.strerror}") from None
+    if as_json:
+        import json
+
+        click.echo(json.dumps(part, indent=1, allow_nan=False))
+    else:
+        click.echo(text(part))
