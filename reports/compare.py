@@ -199,7 +199,7 @@ def _run_cells(
 
 
 def compile_reference(progress: Progress) -> None:
-    """Compile the reference's kernels before any cell's clock runs: under a minute the first time, then stored."""
+    """Compile the reference's kernels before any cell's clock runs: some 80 s the first time, then stored."""
     progress("compiling the reference (first run only)", 0, 1)
     for _ in run_jobs([executors.WARM_UP], 1):
         progress("compiling the reference (first run only)", 1, 1)
