@@ -3,9 +3,9 @@
 Every sphere keeps its own time and its own next event. The earliest event of all is taken: if the partner has changed
 its motion since, the sphere looks again, else the impact is resolved and both look for their next.
 
-Impacts at one instant are taken one after the other, lowest sphere first, and again while any pair approaches: a
-corner hit is a hit on both walls. Where more than two spheres meet at one instant the outcome depends on that order;
-independent impacts do not, so only those are as symmetric as the scene.
+Impacts of several pairs at one instant that hang together are taken at once (`exact_together`), so that a symmetric
+scene stays symmetric to round-off. Where bounciness differs among them they are taken one after the other, lowest
+sphere first, and again while any pair approaches: then the outcome depends on that order.
 """
 
 from __future__ import annotations
@@ -14,10 +14,14 @@ from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.events_queue import earliest
 from impactbench.reference.exact_impact import settle, strike_sphere, strike_wall
 from impactbench.reference.exact_predict import EDGE, SPHERE, enter_cell, fly, predict
+from impactbench.reference.exact_together import several, strike_together
 from impactbench.reference.exact_world import RADIUS, SPEED, World
 
 REACHED, TOO_MANY, CROWDED, AT_EDGE = 0, 1, 2, 3
 """How a run ends: at its time, at the bound of events, at impacts without end in one instant, at a box's edge."""
+
+IMPACT, ALONE = 4, 5
+"""What is left to do of an event: an impact; an impact of one pair only."""
 
 CROWD = 1000
 """Events of one sphere in one instant from which on they are taken to have no end."""
@@ -50,27 +54,37 @@ def run(world: World, until: float, most: int) -> tuple[int, float]:
         now = queue.due[i]
         if not now <= until:
             return REACHED, until
-        outcome = process(world, i, now)
+        outcome = come_to(world, i, now)
+        if outcome == IMPACT:
+            outcome = strike_all(world, i, now) if several(world, i, now) else ALONE
+            if outcome == ALONE:
+                outcome = strike(world, i, now)
         if outcome != REACHED:
             return outcome, now
     return TOO_MANY, queue.due[earliest(queue)]
 
 
 @inlined
-def process(world: World, i: int, now: float) -> int:
-    """One event of sphere i."""
+def come_to(world: World, i: int, now: float) -> int:
+    """The event of sphere i, as far as it is none that changes velocities; else `IMPACT` or `AT_EDGE`."""
     s = world.spheres
     if s.leaves[i]:
         enter_cell(world, i, now)
         return REACHED
-    kind, partner = s.kind[i], s.partner[i]
-    if kind == EDGE:
+    if s.kind[i] == EDGE:
         return AT_EDGE
-    if kind == SPHERE:
-        if s.partner_events[i] != s.events[partner]:
-            predict(world, i, now)
-            return REACHED
-        crowded = count_event(world, i, now)
+    if s.kind[i] == SPHERE and s.partner_events[i] != s.events[s.partner[i]]:
+        predict(world, i, now)
+        return REACHED
+    return IMPACT
+
+
+@inlined
+def strike(world: World, i: int, now: float) -> int:
+    """The impact of sphere i with its partner."""
+    s, partner = world.spheres, world.spheres.partner[i]
+    crowded = count_event(world, i, now)
+    if s.kind[i] == SPHERE:
         crowded |= count_event(world, partner, now)
         crowded |= strike_sphere(world, i, partner)
         world.tally[0] += 1
@@ -78,11 +92,25 @@ def process(world: World, i: int, now: float) -> int:
             settle(world, partner)
             predict(world, partner, now)
     else:
-        crowded = count_event(world, i, now)
         strike_wall(world, i, partner)
         world.tally[1] += 1
     settle(world, i)
     predict(world, i, now)
+    return CROWDED if crowded else REACHED
+
+
+@compiled
+def strike_all(world: World, i: int, now: float) -> int:
+    """The impacts of this instant that hang together with sphere i; `ALONE` if it meets one partner only."""
+    members = strike_together(world, i, now)
+    if len(members) == 0:
+        return ALONE
+    crowded = False
+    for k in members:
+        crowded |= count_event(world, k, now)
+        settle(world, k)
+    for k in members:
+        predict(world, k, now)
     return CROWDED if crowded else REACHED
 
 

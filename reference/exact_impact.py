@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from impactbench.reference.compiled import compiled, inlined
-from impactbench.reference.exact_world import SPEED, World
+from impactbench.reference.exact_world import RADIUS, SPEED, World
 
 SWEEPS = 1000
 
@@ -47,25 +47,41 @@ def strike_sphere(world: World, i: int, k: int) -> bool:
 def strike_wall(world: World, i: int, w: int) -> None:
     """One-way impact: v' = b (v - 2 (v . n) n) (documents, rule R13) or v' = v - (1 + e) (v . n) n (Newton).
 
+    Times have last digits of their own, so the sphere is a little before or behind the wall: it goes back b times as
+    far as it got behind, else every bounce would shift the path by twice that.
+    """
+    s, n, rules = world.spheres, world.walls.normal[w], world.rules
+    b = rules.bounciness[s.group[i], world.walls.group[w]]
+    x, v = s.motion[i, :3], s.motion[i, SPEED : SPEED + 3]
+    along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+    gap = x[0] * n[0] + x[1] * n[1] + x[2] * n[2] - (world.walls.level[w] + s.motion[i, RADIUS])
+    for k in range(3):
+        v[k] = b * (v[k] - 2.0 * along * n[k]) if rules.doc else v[k] - (1.0 + b) * along * n[k]
+        x[k] -= (1.0 + b) * gap * n[k]
+    rest_on_wall(world, i, w)
+
+
+@inlined
+def rest_on_wall(world: World, i: int, w: int) -> None:
+    """After an impact: whether the sphere bounces or stays on the wall.
+
     Bounces get shorter without end where b < 1 (Zeno). A sphere that leaves slower than `rest` [m/s] and is pressed
     back by gravity is at rest on the wall; the bounces left out rise less than rest^2/(2 a). With b = 1, bounces of
     round-off would go on for ever: such that rise less than `rise` [m] are left out. Without a pressing gravity the
     sphere must not leave at all.
     """
     s, n, rules = world.spheres, world.walls.normal[w], world.rules
-    b = rules.bounciness[s.group[i], world.walls.group[w]]
     v = s.motion[i, SPEED : SPEED + 3]
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
-    for k in range(3):
-        v[k] = b * (v[k] - 2.0 * along * n[k]) if rules.doc else v[k] - (1.0 + b) * along * n[k]
     pull = rules.gravity[0] * n[0] + rules.gravity[1] * n[1] + rules.gravity[2] * n[2]
     slow = rules.still
     if pull < 0.0:
-        slow = rules.rest if b < 1.0 else math.sqrt(-2.0 * pull * rules.rise)
-    s.rests[i, w] = pull <= 0.0 and -b * along <= slow
+        elastic = rules.bounciness[s.group[i], world.walls.group[w]] == 1.0
+        slow = math.sqrt(-2.0 * pull * rules.rise) if elastic else rules.rest
+    s.rests[i, w] = pull <= 0.0 and along <= slow
     if s.rests[i, w]:
         for k in range(3):
-            v[k] += b * along * n[k]
+            v[k] -= along * n[k]
 
 
 @inlined

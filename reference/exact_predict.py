@@ -37,7 +37,7 @@ def predict(world: World, i: int, now: float) -> None:
     s = world.spheres
     fly(world, i, now)
     s.kind[i] = NOTHING
-    due = math.inf
+    due = s.second[i] = math.inf
     if world.rules.collide:
         due = first_wall(world, i, now, due)
         due = first_sphere(s, world.cells, world.rules.pulled, i, now, due, NO_SIDE)
@@ -98,10 +98,12 @@ def first_wall(world: World, i: int, now: float, due: float) -> float:
             gap = 0.0  # else a closed gap of round-off would give every bounce the speed of a fall through it
         behind = walls.bounded[w] and gap < -world.rules.touch
         wait = fall_back(gap, speed, pull) if behind else land(gap, speed, pull)
-        if now + wait < due:
+        if now + wait < s.second[i]:
             kind = where_on_face(world, i, w, wait) if walls.bounded[w] else WALL
-            if kind != NOTHING:
-                due, s.kind[i], s.partner[i] = now + wait, kind, w
+            if kind != NOTHING and now + wait < due:
+                due, s.second[i], s.kind[i], s.partner[i] = now + wait, due, kind, w
+            elif kind != NOTHING:
+                s.second[i] = now + wait
     return due
 
 
@@ -170,7 +172,10 @@ def first_sphere(s: Spheres, cells: Cells, pulled: bool, i: int, now: float, due
                                 radius + m[k, RADIUS],
                             )
                         if now + wait < due:
+                            s.second[i] = due
                             due, s.kind[i], s.partner[i], s.partner_events[i] = now + wait, SPHERE, k, s.events[k]
+                        elif now + wait < s.second[i]:
+                            s.second[i] = now + wait
                     k = cells.after[k]
     return due
 

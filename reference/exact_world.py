@@ -12,10 +12,10 @@ from impactbench.reference.particles import Flags, Indices
 from impactbench.scenarios.records import Law, Model, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats
 
-REST, STILL, TOUCH, INSTANT, RISE = 1e-10, 1e-13, 1e-10, 1e-13, 1e-14
+REST, STILL, TOUCH, INSTANT, CLOSED, RISE = 1e-10, 1e-13, 1e-10, 1e-13, 1e-13, 1e-14
 """Next to the scene's scales: speed off a wall below which a pressed body rests, speed that counts as none, gap that
-counts as touching at t = 0, span of time that counts as one instant, and
-height of an elastic bounce that counts as rest."""
+counts as touching at t = 0, span of time that counts as one instant, gap that counts as closed in it, and height of an
+elastic bounce that counts as rest."""
 
 
 SPEED, TIME, RADIUS = 3, 6, 7
@@ -39,6 +39,8 @@ class Spheres(NamedTuple):
     rests: Flags
     events: Indices
     contact: Floats
+    second: Floats
+    """Time [s] of the contact that comes after it, as far as it was looked for."""
     kind: Indices
     partner: Indices
     partner_events: Indices
@@ -51,7 +53,8 @@ class Spheres(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """bounciness: table by group of bodies. rest, still [m/s], touch [m], instant [s]: see `REST`."""
+    """bounciness: table by group of bodies. rest, still [m/s], touch, closed, rise [m], instant [s]: see
+    `REST`."""
 
     gravity: Floats
     pulled: bool
@@ -63,6 +66,7 @@ class Rules(NamedTuple):
     still: float
     touch: float
     instant: float
+    closed: float
     rise: float
 
 
@@ -98,6 +102,7 @@ def build_world(scene: Scene, law: Law, model: Model) -> World:
             still=STILL * scene.speed,
             touch=TOUCH * scene.length,
             instant=INSTANT * scene.length / scene.speed,
+            closed=CLOSED * scene.length,
             rise=RISE * scene.length,
         ),
         queue=build_queue(len(scene.movable)),
@@ -121,6 +126,7 @@ def build_spheres(scene: Scene, order: list[int], gravity: Floats, groups: list[
         rests=np.zeros((count, walls), dtype=np.bool_),
         events=np.zeros(count, dtype=np.int64),
         contact=np.full(count, np.inf),
+        second=np.full(count, np.inf),
         kind=np.zeros(count, dtype=np.int64),
         partner=np.zeros(count, dtype=np.int64),
         partner_events=np.zeros(count, dtype=np.int64),

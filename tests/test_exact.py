@@ -13,6 +13,7 @@ from impactbench.reference.events_roots import curve, meet
 from impactbench.reference.exact_contestant import Exact
 from impactbench.scenarios.catalogue import select
 from impactbench.scenarios.engine import Engine, Unsupported
+from impactbench.scenarios.hard import case_named
 from impactbench.scenarios.records import FULL, Body, Box, Capsule, Contact, HalfSpace, Model, Scene, Sphere
 
 G = 9.81
@@ -139,21 +140,49 @@ def test_nothing_ever_overlaps(law, gravity, b):
     assert least >= -50 * EPS * 6
 
 
-def test_ten_thousand_bounces_run_backwards():
-    walls, inner = room(1.0), 0.8
-    start, velocity = np.array([0.31, 0.52, 0.47]), np.array([1.0, 0.7, 0.4])
-    there = engine(scene([*walls, ball("ball", start, velocity)]), step=4000.0)
+def test_a_hundred_thousand_bounces_run_backwards():
+    """A non-chaotic path: round-off adds up and is not amplified."""
+    walls, inner, time = room(1.0), 0.2, 10_000.0
+    start, velocity = np.array([0.41, 0.52, 0.47]), np.array([1.0, 0.7, 0.4])
+    there = engine(scene([*walls, ball("ball", start, velocity, radius=0.4)]), step=time)
     there.advance(1)
-    assert there.impacts[1] > 10_000
+    assert there.impacts[1] > 100_000
     turn = there.read()
-    folded = np.mod(start - 0.1 + velocity * 4000, 2 * inner)
-    expected = np.minimum(folded, 2 * inner - folded) + 0.1
-    # Times near 4000 s are kept to EPS * 4000 s per bounce; 10^4 bounces err by 1e-8 m at worst, 1e-10 m at random.
-    assert np.abs(turn.positions[0] - expected).max() <= 1e-9
-    back = engine(scene([*walls, ball("ball", turn.positions[0], -turn.velocities[0])]), step=4000.0)
+    folded = np.mod(start - 0.4 + velocity * time, 2 * inner)
+    expected = np.minimum(folded, 2 * inner - folded) + 0.4
+    # Coordinates below 1 m err by an EPS a bounce at worst, which makes 2e-11 m.
+    bound = there.impacts[1] * EPS
+    assert np.abs(turn.positions[0] - expected).max() <= bound
+    back = engine(scene([*walls, ball("ball", turn.positions[0], -turn.velocities[0], radius=0.4)]), step=time)
     back.advance(1)
-    assert np.abs(back.read().positions[0] - start).max() <= 1e-9
-    assert np.abs(back.read().velocities[0] + velocity).max() <= 1e-12
+    assert np.abs(back.read().positions[0] - start).max() <= 2 * bound
+    # Velocities only change their signs.
+    assert np.array_equal(back.read().velocities[0], -velocity)
+
+
+def test_a_billiard_of_five_spheres_run_backwards_errs_as_its_copies_part():
+    """A chaotic path: what round-off does to it is some EPS times the growth of a small difference, at every time."""
+    places = np.array([[0.2, 0.3, 0.25], [0.7, 0.25, 0.6], [0.3, 0.75, 0.7], [0.75, 0.7, 0.3], [0.5, 0.5, 0.5]])
+    speeds = np.random.default_rng(3).normal(size=(5, 3))
+
+    def after(time, where, velocity):
+        balls = [ball(f"{i}", *motion) for i, motion in enumerate(zip(where, velocity, strict=True))]
+        run = engine(scene([*room(1.0), *balls]), step=time)
+        run.advance(1)
+        return run.read()
+
+    small, growths, errors = 1e-10, [], []
+    for time in (0.5, 1.0, 1.5, 2.0, 2.5):
+        turn = after(time, places, speeds)
+        back = after(time, turn.positions, -turn.velocities).positions
+        copy = after(time, turn.positions + small * np.array([1.0, -1.0, 1.0]), -turn.velocities).positions
+        growths.append(np.abs(copy - back).max() / small)
+        errors.append(np.abs(back - places).max())
+    assert growths[-1] > 1e6 * growths[0]
+    # Some 20 impacts a second err by an EPS or two each, early ones in directions that grow less than the copy's: over
+    # seven powers of ten the error stays within three of EPS times the growth.
+    for growth, error in zip(growths, errors, strict=True):
+        assert 1e-3 * EPS * growth <= error <= 1e3 * EPS * growth
 
 
 @laws
@@ -266,6 +295,59 @@ def test_independent_impacts_at_one_instant_mirror_exactly(law):
     assert run.impacts[0] >= 2
     assert np.array_equal(state.positions[:2] * (-1, 1, 1), state.positions[2:])
     assert np.array_equal(state.velocities[:2] * (-1, 1, 1), state.velocities[2:])
+
+
+@laws
+@pytest.mark.parametrize("b", [0.0, 0.5, 1.0])
+def test_a_ball_between_two_gives_both_the_same(law, b):
+    """Normals at 30 degrees, c^2 = 3/4. Each gets p = m v (1 + e) c/(1 + 2 c^2) along its normal: elastic, the ball
+    comes back at v/5 and the two leave at 6 v/(5 sqrt 3). Glued (R8), all three go on at v/3.
+    """
+    near = (math.sqrt(0.03), 0.1)
+    balls = [ball("cue", (-1, 0, 0), (2, 0, 0)), *(ball(f"{z}", (near[0] - 0.3, 0, z * near[1])) for z in (-1, 1))]
+    run = engine(scene([*balls], (0, 2), bounciness=b), law)
+    run.advance(1)
+    push = 2 * (1 + b) * math.sqrt(3) / 2 / 2.5
+    newton = np.array([[2 - math.sqrt(3) * push, 0], *([math.sqrt(3) / 2 * push, z * push / 2] for z in (-1, 1))])
+    elastic = np.array([[-0.4, 0], *([1.2, z * 1.2 / math.sqrt(3)] for z in (-1, 1))])
+    due = newton if law == "nc" else b * elastic + (1 - b) * np.array([[2 / 3, 0]] * 3)
+    assert np.abs(run.read().velocities[:, [0, 2]] - due).max() <= 20 * EPS
+
+
+@laws
+@pytest.mark.parametrize("b", [0.3, 1.0])
+@pytest.mark.parametrize("face", ["flat", "point"])
+def test_a_symmetric_break_is_symmetric(law, b, face):
+    (case,) = (case_named(f"simultaneous_break[rows=2,face={face}]"),)
+    world = replace(case.scene, contact=Contact(b))
+    run = engine(world, law, world.duration)
+    run.advance(1)
+    velocities, total = run.read().velocities, np.array([3.0, 0.0, 0.0])
+    assert np.abs(velocities[2] - velocities[3] * (1, 1, -1)).max() <= 20 * EPS  # the row of two
+    assert np.abs(velocities.sum(axis=0) - total).max() <= 20 * EPS
+    assert (velocities**2).sum() <= 9 * (1 + 20 * EPS)
+    if b == 1:
+        assert (velocities**2).sum() == pytest.approx(9, rel=20 * EPS)
+
+
+def test_a_corner_reverses_both_and_unlike_walls_are_taken_one_by_one():
+    corner = [Body(n, HalfSpace(w), None, (0.0, 0.0, 0.0)) for n, w in (("x", (1.0, 0, 0)), ("z", (0.0, 0.0, 1.0)))]
+    hit = scene([*corner, ball("ball", (0.6, 0, 0.6), (-1, 0, -1))], (0, 2), bounciness=1.0)
+    run = engine(hit)
+    run.advance(1)
+    assert run.impacts == (0, 2)
+    assert run.read().velocities[0].tolist() == [1, 0, 1]
+    unlike = engine(replace(hit, pairs=(("x", "ball", Contact(0.5)),)), "nc")
+    unlike.advance(1)
+    assert unlike.read().velocities[0].tolist() == [0.5, 0, 1]
+
+
+def test_two_balls_that_hit_a_touching_row_send_two_on():
+    row = [ball(f"{i}", (0.2 * i, 0, 0), ((1.0 if i < 2 else 0.0), 0, 0)) for i in range(2)]
+    row += [ball(f"{i}", (0.2 * i + 0.5, 0, 0)) for i in range(2, 5)]
+    run = engine(scene(row, (0,), bounciness=1.0))
+    run.advance(1)
+    assert run.read().velocities[:, 0].tolist() == [0, 0, 0, 1, 1]
 
 
 def test_one_call_is_as_many_single_steps_and_the_full_model_is_the_same():
