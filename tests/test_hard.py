@@ -93,6 +93,7 @@ BREAKING = [
     ("Slow", "bullet_wall[travel=1]", "approach"),
     ("Dull", "bullet_wall[travel=1]", "rebound"),
     ("Slow", "fast_flight[speed=10]", "speed"),
+    ("Frozen", "fast_flight[speed=10]", "unclipped"),
     ("Trembling", "deep_overlap[overlap=0.1]", "calm"),
     ("Frozen", "deep_overlap[overlap=0.1]", "resolved"),
     ("Trembling", "zeno[bounciness=0.5]", "settles"),
