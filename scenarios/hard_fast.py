@@ -113,8 +113,8 @@ FAST = (
         "unclipped",
         "one step takes no more than a twentieth of the speed",
         0.05,
-        "no force acts. Damping that a vendor's defaults add takes little per step; a largest speed takes all above it: "
-        "this breaks a twentieth above such a speed",
+        "no force acts. Damping of a vendor's defaults takes little a step; a largest speed takes all above it, so "
+        "this breaks a twentieth above it",
         clipped,
     ),
 )
