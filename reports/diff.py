@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from impactbench.reports import rankings
 from impactbench.reports.page_data import FLOOR, tidy_cells, tidy_rungs
+from impactbench.reports.rankings import Rankings
 
 THRESHOLD = 2 * FLOOR
 """Each of the two figures is uncertain by the floor."""
@@ -58,6 +60,7 @@ class Diff:
     after: dict[str, Any]
     changes: list[Change]
     notes: list[str] = field(default_factory=list)
+    rankings: Rankings = field(default_factory=Rankings)
 
     def counts(self) -> dict[str, int]:
         """Number of (case, policy, measure) by verdict."""
@@ -85,7 +88,7 @@ def compare(before: dict[str, Any], after: dict[str, Any]) -> Diff:
     order = list(MARKS)
     changes = [_worst(found) for found in rungs.values()]
     changes.sort(key=lambda change: (order.index(change.verdict), -change.size))
-    return Diff(before, after, changes, _notes(before, after, machine))
+    return Diff(before, after, changes, _notes(before, after, machine), rankings.compare(before, after))
 
 
 def _rungs(document: dict[str, Any]) -> pd.DataFrame:

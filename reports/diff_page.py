@@ -28,7 +28,7 @@ def render(diff: Diff) -> str:
         .get_template("diff.html")
         .render(
             verdict=diff_text.verdict(diff),
-            notes=diff.notes,
+            notes=[*diff.notes, *diff_text.turned(diff)],
             runs=[("before", diff.before["provenance"]), ("after", diff.after["provenance"])],
             chart=chart(diff),
             policies=list(dict.fromkeys(change.policy for change in diff.changes)),

@@ -28,7 +28,14 @@ def verdict(diff: Diff) -> list[dict[str, str]]:
         text = f"{number}{': ' if texts[word] else ''}{texts[word]}."
         found.append({"kind": kinds[word] if counts[word] else "take", "mark": mark, "word": word.capitalize()})
         found[-1]["text"] = text if counts[word] else "nothing."
+    if ranked := str(diff.rankings):
+        found.append({"kind": "take", "mark": "↕", "word": "Rankings", "text": ranked + "."})
     return found
+
+
+def turned(diff: Diff) -> list[str]:
+    """The pairs of policies whose order changed, as many as a text lists."""
+    return [str(pair) for pair in diff.rankings.turned[:LISTED]]
 
 
 def _largest(diff: Diff, verdict: str) -> str:
@@ -69,6 +76,8 @@ def markdown(diff: Diff) -> str:
     parts.append("\n".join(f"- {line['mark']} **{line['word']}**: {escape(line['text'])}" for line in verdict(diff)))
     if diff.notes:
         parts.append("\n".join(f"- {escape(note)}" for note in diff.notes))
+    if diff.rankings.turned:
+        parts += ["## Changed order", "\n".join(f"- {escape(pair)}" for pair in turned(diff))]
     for kind in (WORSE, BETTER):
         found = diff.of(kind)
         if found:
@@ -88,7 +97,7 @@ def terminal(diff: Diff) -> str:
     from impactbench.reports import terminal as plain
 
     lines = [f"{line['mark']} {line['word']}: {line['text']}" for line in verdict(diff)]
-    lines += [f"  {note}" for note in diff.notes]
+    lines += [f"  {note}" for note in (*diff.notes, *turned(diff))]
     found = [*diff.of(WORSE), *diff.of(BETTER)]
     if found:
         lines += ["", plain.table(COLUMNS, [row(change) for change in found[:LISTED]])]
@@ -105,4 +114,5 @@ def as_json(diff: Diff) -> dict[str, Any]:
         "counts": diff.counts(),
         "notes": diff.notes,
         "changes": [asdict(change) for change in diff.changes],
+        "rankings": asdict(diff.rankings),
     }
