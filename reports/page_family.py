@@ -7,6 +7,7 @@ import statistics
 from typing import TYPE_CHECKING, Any
 
 from impactbench.reports import charts, charts_plain
+from impactbench.reports.chart_layout import NARROW, WIDE
 from impactbench.reports.chart_svg import Drawing, rounded
 from impactbench.reports.page_data import Rung, amount, listing, order, words
 from impactbench.reports.page_scores import reach
@@ -99,10 +100,16 @@ def speed_chart(view: View, name: str, case: dict[str, Any], points: list[Rung])
     ]
     limits += [(value, words(name)) for name, value in case.get("null", {}).items() if value]
     limits += [(case["floor"], "round-off")] if "floor" in case else []
-    spec = charts.work_precision(points, failures(view, case["name"]), view.style, titles, limits)
-    spec = rounded({**spec, "description": f"{cost} against {over}; the table below holds the same data"})
-    timed = all(point["timed"] for point in points)
-    return {"id": name, "spec": spec, "svg": Drawing(spec, name), "timed": timed, "over": over, "cost": cost}
+    silent, timed = failures(view, case["name"]), all(point["timed"] for point in points)
+    described = {"description": f"{cost} against {over}; the table below holds the same data"}
+    # The first chart is drawn once more for the width of a phone.
+    frames = {"": WIDE} | ({"narrow": NARROW} if case["name"] == view.featured else {})
+    drawings = []
+    for kind, frame in frames.items():
+        spec = rounded(charts.work_precision(points, silent, view.style, titles, limits, frame) | described)
+        own = f"{name}-{kind}" if kind else name
+        drawings.append({"id": own, "kind": kind, "spec": spec, "svg": Drawing(spec, own)})
+    return {"id": name, "drawings": drawings, "timed": timed, "over": over, "cost": cost}
 
 
 def convergence_chart(

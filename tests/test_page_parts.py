@@ -76,7 +76,7 @@ def test_null_models_and_floors_are_lines_in_the_chart() -> None:
     maker = Maker()
     maker.cell("a", "x/y", 60, {"position_error": 0.1, "null_position_error": 0.5, "floor_position_error": 1e-7})
     html = page.render(document(maker, [case("a", "a")]))
-    (spec,) = (json.loads(spec) for spec in specs(html))
+    spec, _ = (json.loads(spec) for spec in specs(html))
     rows = [row for rows in spec["datasets"].values() for row in rows]
     assert {(row["x"], row["t"]) for row in rows if "t" in row} >= {
         (0.5, "null model"),

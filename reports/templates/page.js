@@ -208,7 +208,7 @@ async function remeasure(select) {
   const figure = select.closest("figure"), section = document.querySelector(`section[data-case="${CSS.escape(figure.dataset.case)}"]`);
   const rungs = jsonOf(figure.querySelector(".rungs")), pick = select.selectedIndex;
   const name = select.value + (rungs.units[pick] === "1" ? " (1 = the scene's own scale)" : ` [${rungs.units[pick]}]`);
-  const box = figure.querySelector(".chart");
+  const box = [...figure.querySelectorAll(".chart")].find((one) => one.offsetParent); // the wide or the narrow one
   const spec = jsonOf(box.querySelector(".spec"));
   const spent = spec.layer[0].encoding.y.axis.title;
   watcher.unobserve(box);
