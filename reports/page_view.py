@@ -130,7 +130,10 @@ class View:
 
     def replay(self) -> dict[str, Any] | None:
         """What the replay's part of the page shows, if anything was recorded."""
-        found = replay_view.view(self.document, self.style, self.featured)
+        worst = page_verdict.worst(self)
+        family = self.cases[worst[0]["case"]]["family"] if worst else None
+        alike = [name for name, case in self.cases.items() if case["family"] == family]
+        found = replay_view.view(self.document, self.style, self.featured, alike)
         self.thinned += found["notes"] if found else []
         return found
 
