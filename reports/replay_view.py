@@ -45,7 +45,7 @@ def view(
         **{key: found[key] for key in ("limit", "levels", "series", "cases")},
         "usual": usual,
         "styles": {name: {"colour": colour_of(name, style), "dash": dash_of(name)} for name in names},
-        "poster": {"case": first["case"], "time": picture["time"]},
+        "poster": {"case": first["case"], "time": picture["time"], "focus": further(first, picture["runs"])},
     }
     return {
         "data": data,
@@ -100,6 +100,12 @@ def staged(cases: list[dict[str, Any]], featured: str | None, telling: Collectio
         return visible, case["case"] == featured, case["case"] in telling, share(case)
 
     return max(cases, key=rank)
+
+
+def further(case: dict[str, Any], names: Collection[str]) -> str:
+    """Of these runs the one that goes more wrong; empty where there is none."""
+    found = [run for run in case["runs"] if run["contestant"] in names]
+    return str(max(found, key=badness)["contestant"]) if found else ""
 
 
 def table(case: dict[str, Any]) -> Iterable[dict[str, Any]]:

@@ -42,15 +42,18 @@ class Chrome:
         scripts: bool = True,
         dark: bool = False,
         calm: bool = False,
+        printed: bool = False,
     ) -> None:
-        """Load the page afresh; `calm` asks for reduced motion."""
+        """Load the page afresh; `calm` asks for reduced motion, `printed` for the print style."""
         command = self.driver.execute_cdp_cmd
         command("Emulation.setScriptExecutionDisabled", {"value": not scripts})
         scheme, motion = "dark" if dark else "light", "reduce" if calm else "no-preference"
         wanted = {"prefers-color-scheme": scheme, "prefers-reduced-motion": motion}
         features = [{"name": name, "value": value} for name, value in wanted.items()]
-        command("Emulation.setEmulatedMedia", {"features": features})
-        self.driver.set_window_size(*size)
+        command("Emulation.setEmulatedMedia", {"media": "print" if printed else "", "features": features})
+        # Exactly this, where a window has a least width.
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
+        command("Emulation.setDeviceMetricsOverride", metrics)
         self.driver.get("about:blank")
         self.driver.get_log("browser")
         self.driver.get_log("performance")

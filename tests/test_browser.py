@@ -10,6 +10,7 @@ from browsers import Chrome, Firefox
 from impactbench.reports import diff, diff_page, page, page_scores
 from impactbench.reports.page_data import TARGETS, percent
 from impactbench.reports.page_view import View
+from test_charts import SPECIAL
 from test_page import HOSTILE, Maker, case, document, small
 
 DRAWN = """(() => {  // scrolls to what is not drawn yet
@@ -68,6 +69,56 @@ def test_hostile_names_stay_text_after_the_script_has_drawn_them(chrome: Chrome,
     assert chrome.js("return document.images.length") == 0
     assert HOSTILE[:12] in chrome.js("return document.querySelector('.live').textContent")
     assert chrome.console() == []
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+def test_hostile_names_stay_text_in_a_tooltip(name: str, chrome: Chrome, tmp_path: Path) -> None:
+    maker = Maker()
+    maker.ladder("a", f"{name}/default", 0.1, 1e-4)
+    path = tmp_path / "report.html"
+    page.write_page(document(maker, [case("a", "a")]), path)
+    chrome.open(path)
+    chrome.until(DRAWN)
+    chrome.js("""const mark = document.querySelector('.live .mark-symbol path'), box = mark.getBoundingClientRect();
+      const at = {clientX: box.x + box.width / 2, clientY: box.y + box.height / 2, bubbles: true};
+      mark.dispatchEvent(new PointerEvent('pointermove', at));""")
+    chrome.until("document.querySelector('#vg-tooltip-element.visible')")
+    tooltip = chrome.js("return document.querySelector('#vg-tooltip-element').textContent")
+    assert name[:60] in tooltip
+    assert chrome.js("return document.images.length") == 0
+    assert chrome.console() == []
+
+
+@pytest.mark.parametrize("size", [(390, 844), (320, 700)])
+def test_a_phone_shows_a_chart_of_its_width_and_nothing_sideways(
+    size: tuple[int, int], chrome: Chrome, small_page: Path
+) -> None:
+    chrome.open(small_page, size=size)
+    chrome.until(DRAWN)
+    assert chrome.js("return document.documentElement.scrollWidth") == size[0]
+    shown = chrome.js("return [...document.querySelectorAll('.first .chart')].map(one => one.offsetParent !== null)")
+    assert shown == [False, True]
+    edges = "const box = document.querySelector('.first .narrow .live svg').getBoundingClientRect();"
+    left, right = chrome.js(f"{edges} return [box.left, box.right]")
+    assert 0 <= left < right <= size[0]
+    assert right - left > 0.8 * size[0]
+
+
+def test_print_holds_charts_and_whole_tables_and_no_controls(chrome: Chrome, tmp_path: Path) -> None:
+    maker = Maker()
+    for index in range(10):
+        maker.ladder("bounce[bounciness=0.5]", f"engine{index}/default", 0.1, 1e-4)
+    path = tmp_path / "report.html"
+    page.write_page(document(maker, [case("bounce[bounciness=0.5]", "bounce")]), path)
+    sheet = 718  # A4 less 1 cm margins at 96 to the inch
+    chrome.open(path, size=(sheet, 1000), printed=True, dark=True)
+    assert chrome.js("return [...document.querySelectorAll('table')].filter(one => one.offsetParent).length") > 1
+    boxes = "[...document.querySelectorAll('table, svg, .card')].filter(one => one.getClientRects().length)"
+    assert chrome.js(f"return {boxes}.map(one => one.getBoundingClientRect().right).every(x => x <= {sheet})")
+    assert chrome.js("return [...document.querySelectorAll('.chart svg')].some(one => one.getClientRects().length)")
+    shown = "[...document.querySelectorAll('.control, nav, button')].filter(one => one.getClientRects().length).length"
+    assert chrome.js(f"return {shown}") == 0
+    assert chrome.js("return getComputedStyle(document.body).color") == "rgb(0, 0, 0)"  # whatever the scheme
 
 
 def choose(chrome: Chrome, selector: str, field: str, value: float, event: str) -> None:

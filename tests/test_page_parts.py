@@ -35,6 +35,7 @@ def test_cards_name_the_worst_cell_of_each_law_and_how_to_see_it_again() -> None
     ]
     assert (found[1]["when"], found[1]["bodies"]) == ("t = 0.25 s", "ball, wall")
     assert found[2]["numbers"].startswith("energy drift −30 %")
+    assert (found[2]["when"], found[2]["bodies"]) == ("t = 1 s", "all")  # taken at the end
     assert found[2]["count"] == 2  # -0.005 is within the limit
     assert found[2]["command"] == (
         "impactbench run a --engine reference/x --step 1/60 --phase 0.25 --model full --law doc"

@@ -35,16 +35,18 @@ def recorded(name: str, off: float, names: tuple[str, ...] = NAMES) -> dict[str,
 
 
 def poster(cases: list[dict[str, Any]], featured: str, telling: tuple[str, ...] = ()) -> dict[str, Any]:
+    """What the poster shows, and the run the replay begins with."""
     found = {"notes": [], "limit": 0.01, "levels": [], "series": [], "cases": cases}
     view = replay_view.view({"replays": found}, STYLE, featured, telling)
     assert view is not None
-    return dict(view["poster"])
+    return {**view["poster"], "focus": view["data"]["poster"]["focus"]}
 
 
 def test_it_shows_the_charts_own_case_where_runs_visibly_part_in_it() -> None:
     found = poster([recorded(BALL, 2.0), recorded(WALL, 2.0)], WALL)
     assert (found["case"], found["visible"], found["instead"]) == (WALL, True, None)
     assert "c/three" in found["runs"]
+    assert found["focus"] == "c/three"  # of the two the one that is wrong
     # Away by 2 lengths at the end, from half the time on: the sentence's size is what was measured at that time.
     part = 2 * found["time"] / case_named(WALL).scene.duration - 1
     assert float(found["size"].removesuffix(" %")) == pytest.approx(200 * part, abs=0.05)  # three digits

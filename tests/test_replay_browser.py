@@ -10,7 +10,8 @@ import pytest
 from browsers import Chrome, Firefox
 from impactbench.reports import page
 from replay_pages import BALL, boxes, real
-from test_page import HOSTILE, small
+from test_charts import SPECIAL
+from test_page import small
 
 READY = "document.querySelector('#replay-panels canvas') && document.querySelector('#replay-plots svg')"
 FRAME = 1 / 60
@@ -82,6 +83,7 @@ def test_keys_step_jump_and_play_and_the_address_follows(chrome: Chrome, report:
     chrome.until("Number(document.getElementById('replay-time').value) > 0.03")
     press(chrome, " ")
     assert chrome.js("return document.querySelector('#replay-panels canvas').toDataURL()") != still
+    assert chrome.js("return document.createElement('canvas').getContext('webgl')") is None  # it moves without
     stopped = text(chrome, "clock")
     time = "Number(new URLSearchParams(location.hash.slice(1)).get('t'))"
     chrome.until(f"{time}.toFixed(3) + ' s' === '{stopped}'")
@@ -143,13 +145,20 @@ def test_without_scripts_poster_and_numbers_stand_and_no_dead_controls(chrome: C
     assert hidden
 
 
-def test_names_stay_text_in_the_replay(chrome: Chrome, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [*SPECIAL, "\u202eright to left \u05d0\u05d1"])
+def test_names_stay_text_in_the_replay(name: str, chrome: Chrome, tmp_path: Path) -> None:
     path = tmp_path / "hostile.html"
-    boxes(path, 4, (f"{HOSTILE}/default", "b/two"))
-    chrome.open(path, address("crowd", f"{HOSTILE}/default", 0.5))
+    own = f"{name}/default"
+    boxes(path, 4, (own, "b/two"))
+    chrome.open(path, address("crowd", own, 0.5))
     chrome.until(READY)
-    assert value(chrome, "focus") == f"{HOSTILE}/default"
+    assert value(chrome, "focus") == own
+    # Panels, boxes to choose them, the title of the plots, the poster: the name and nothing made of it.
+    for place in ("#replay-panels", "#replay-runs", "#replay-plots-title", ".poster"):
+        assert own in chrome.js(f"return document.querySelector('{place}').textContent")
+    assert own in chrome.js("return document.querySelector('#replay-panels canvas').getAttribute('aria-label')")
     assert chrome.js("return document.querySelectorAll('img').length") == 0
+    assert chrome.js("return document.documentElement.scrollWidth") == 1366
     assert chrome.console() == []
 
 
