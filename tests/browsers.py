@@ -81,6 +81,12 @@ class Chrome:
         return [url for url in urls if not url.startswith(("data:", "blob:"))]
 
 
+def busy(chrome: Chrome) -> float:
+    """Processor seconds the page's main thread has spent in tasks."""
+    metrics = chrome.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+
 @contextmanager
 def open_chrome(*options: str) -> Iterator[Chrome]:
     """A headless chromium; skips where it or its driver is not installed."""

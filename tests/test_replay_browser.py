@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from browsers import Chrome, Firefox
+from browsers import Chrome, Firefox, busy
 from impactbench.reports import page
 from replay_pages import BALL, boxes, real
 from test_charts import SPECIAL
@@ -193,12 +193,6 @@ def test_300_boxes_in_four_panels_and_the_overlay_can_be_drawn_30_times_a_second
     print(f"{frames} frames in 1.5 s; {1000 * each:.1f} ms of the main thread each")
     assert frames
     assert each <= 1 / 30
-
-
-def busy(chrome: Chrome) -> float:
-    """Processor seconds the page's main thread has spent in tasks."""
-    metrics = chrome.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
 
 
 def test_results_without_replays_still_make_a_page() -> None:
