@@ -15,7 +15,8 @@ from impactbench.reports.page_scores import reach
 if TYPE_CHECKING:
     from impactbench.reports.page_view import View
 
-MAX_CHARTS = 24  # each costs some 60 kB (drawing and specification) and a quarter of a second
+MAX_CHARTS = 24
+"""Each costs some 60 kB (drawing and specification) and a quarter of a second; fewer where they do not fit."""
 
 
 def section(view: View, index: int, family: str, names: list[str]) -> dict[str, Any]:
@@ -27,7 +28,7 @@ def section(view: View, index: int, family: str, names: list[str]) -> dict[str, 
     points = view.points(name)
     ordered = sorted(points, key=lambda point: (point["policy"], point["step"]))
     orders = {policy: order(line) for policy, line in view.of(name).items()}
-    drawn = len(points) > 0 and index < MAX_CHARTS
+    drawn = len(points) > 0 and (index < view.most_charts or name == view.featured)
     differences = [row for row in view.document.get("law_difference", []) if row["case"] in names]
     measures = shown_measures(view, case, points)
     return {
@@ -157,7 +158,7 @@ def measure_table(view: View, case: str) -> dict[str, Any]:
         for measure in view.measures
         if measured(list(chosen.values()), measure)
     ]
-    steps = [rung["step_text"] or "none" for rung in chosen.values()]
+    steps = [f"step {rung['step_text']}" if rung["step"] > 0 else "no step" for rung in chosen.values()]
     return {"policies": list(chosen), "steps": steps, "rows": rows}
 
 

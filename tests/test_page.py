@@ -284,7 +284,19 @@ def test_sixty_cases_stay_within_the_budget_and_say_what_was_left_out() -> None:
     assert len(html.encode()) <= page.BUDGET
     assert "Each family charts one case" in html
     assert "too large for this page" in html
+    assert "embedded here is the worst phase of every rung" in html
+    # 0.1 at 1/30 halves with the step; 0.1 ms at 1/30 s doubles.
+    line = embedded(html, "results")["rungs"]["case_59"]["a/tuned"]
+    assert line[-2:] == [["1/60", "ok", 0.05, 0.2], ["1/30", "ok", 0.1, 0.1]]
     assert all(f"case_{index}<" in html for index in range(60))
+
+
+def test_where_no_data_fit_fewer_charts_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = page.render(sixty(families=24))
+    monkeypatch.setattr(page, "BUDGET", 1_400_000)  # the scripts of the charts take 0.4 of them
+    html = page.render(sixty(families=24))
+    assert len(html.encode()) <= 1_400_000 < len(whole.encode())
+    assert "Charts are drawn for the first 12 families; the others have tables only." in html
 
 
 def test_a_document_without_any_result_still_makes_a_page() -> None:

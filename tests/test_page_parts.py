@@ -73,6 +73,15 @@ def test_every_repeat_is_in_the_timing_detail() -> None:
     assert "20 µs, at most 1 % of it" in timing["overhead"].replace("2e+01", "20")
 
 
+def test_what_was_not_measured_is_named_with_its_command() -> None:
+    text = page.render(small())
+    assert "hard cases: impactbench hard;" in text
+    assert "what the smallest model saves: impactbench compare --model both." in text
+    maker = Maker()
+    maker.cell("a", "x/y", 60, {"position_error": 0.1}, model="full")
+    assert "the smallest model saves: impactbench" not in page.render(document(maker, [case("a", "a")]))
+
+
 def test_null_models_and_floors_are_lines_in_the_chart() -> None:
     maker = Maker()
     maker.cell("a", "x/y", 60, {"position_error": 0.1, "null_position_error": 0.5, "floor_position_error": 1e-7})
