@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import axe_core_python
 import pytest
 
 WAIT = 60.0  # seconds: a busy machine with one core draws a page in a tenth of that
@@ -85,6 +86,15 @@ def busy(chrome: Chrome) -> float:
     """Processor seconds the page's main thread has spent in tasks."""
     metrics = chrome.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
     return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+
+def serious(chrome: Chrome) -> list[tuple[str, list[str]]]:
+    """What axe-core calls serious or critical in the open page, with the first elements concerned."""
+    chrome.js((Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8"))
+    found = chrome.driver.execute_async_script("const done = arguments[0]; axe.run().then(done)")
+    assert found["passes"]
+    bad = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
+    return [(one["id"], [node["html"][:200] for node in one["nodes"]][:5]) for one in bad]
 
 
 @contextmanager

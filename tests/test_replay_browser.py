@@ -7,7 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from browsers import Chrome, Firefox, busy
+from browsers import Chrome, Firefox, busy, serious
 from impactbench.reports import page
 from replay_pages import BALL, boxes, real
 from test_charts import SPECIAL
@@ -121,6 +121,17 @@ def test_a_click_on_a_point_opens_its_replay_and_says_which_step(chrome: Chrome,
     chrome.until("document.getElementById('replay-plots-title').textContent.includes('mujoco/default')")
     violation = recorded(report, BALL, "mujoco/default")["events"]["first_violation"]
     assert text(chrome, "clock") == f"{violation['time']:.3f} s"
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (390, 844)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_axe_finds_nothing_serious_beside_a_replay(
+    dark: bool, size: tuple[int, int], chrome: Chrome, report: Report
+) -> None:
+    chrome.open(report[0], address(BALL, "mujoco/default", 0.9), dark=dark, size=size)
+    chrome.until(READY)
+    assert chrome.js("return document.querySelectorAll('.poster svg').length") > 1
+    assert serious(chrome) == []
 
 
 def test_firefox_draws_the_replay_and_stays_quiet(firefox: Firefox, report: Report) -> None:
