@@ -39,7 +39,7 @@ def poster(
             "contestant": still.contestant,
             "svg": drawing(case, still, view),
             "error": still.error,
-            "link": link(case["case"], still.contestant, time),
+            "link": link(case["case"], still.contestant, time) + "&close=1",
         }
         for still in stills
     ]

@@ -90,6 +90,30 @@ def test_keys_step_jump_and_play_and_the_address_follows(chrome: Chrome, report:
     assert text(chrome, "clock") == stopped  # it stands
 
 
+def test_a_close_up_fills_the_panels_with_the_bodies_and_is_part_of_the_address(chrome: Chrome, report: Report) -> None:
+    # How much of the first panel bodies cover: everything that is neither clear nor the ground's grey.
+    covered = """const canvas = document.querySelector('#replay-panels canvas');
+      const ground = getComputedStyle(document.documentElement).getPropertyValue('--panel').trim();
+      const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const grey = [1, 3, 5].map(k => parseInt(ground.slice(k, k + 2), 16));
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4)
+        if (data[i + 3] > 200 && grey.some((c, k) => Math.abs(c - data[i + k]) > 8)) count++;
+      return count / (canvas.width * canvas.height)"""
+    chrome.open(report[0], address(BALL, "pymunk/tuned", 0.1))
+    chrome.until(READY)
+    far = chrome.js(f"return (() => {{ {covered} }})()")
+    chrome.js("document.getElementById('replay-close').click()")
+    chrome.until("location.hash.endsWith('&close=1')")
+    near = chrome.js(f"return (() => {{ {covered} }})()")
+    assert near > 5 * far > 0
+    chrome.open(report[0], address(BALL, "pymunk/tuned", 0.1) + "&close=1")
+    chrome.until(READY)
+    assert chrome.js("return document.getElementById('replay-close').checked")
+    assert chrome.js(f"return (() => {{ {covered} }})()") == near
+    assert chrome.js("return document.querySelector('.poster a').hash").endswith("&close=1")
+
+
 def test_buttons_jump_to_what_the_harness_found(chrome: Chrome, report: Report) -> None:
     chrome.open(report[0], address(BALL, "mujoco/default", 0))
     chrome.until(READY)
