@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from impactbench.reports.chart_labels import LINE, SMALL, Box, Segment, between, fit, place
+from impactbench.reports.chart_labels import LINE, SMALL, Box, Segment, Wanted, between, fit, place
 from impactbench.reports.page_data import FLOOR, TARGET, isolated, percent
 
 Row = dict[str, Any]
@@ -121,11 +121,9 @@ def bounds(limits: Sequence[Limit], axes: Axes, spots: Sequence[Spot]) -> dict[s
     """Named lines at errors that do not depend on a policy: what a frozen scene scores, what the truth is good for."""
     drawn = [(x, name) for x, name in limits if x > FLOOR]
     rows = [{"x": x, "y": axes.at_y(0), "y2": axes.at_y(axes.frame.height), "t": name} for x, name in drawn]
-    names = [
-        {"x": axes.at_x(left), "y": axes.at_y(top + LINE / 2), "t": name}
-        for (left, top, *_), (_, name) in zip(bound_names(limits, axes, spots), drawn, strict=True)
-    ]
-    return {"limits": rows, "limit names": names}
+    wanted = [(axes.pixel(x, 1)[0], 0.0, name) for x, name in drawn]
+    boxes = bound_names(limits, axes, spots)
+    return {"limits": rows, "limit names": [text(axes, one, box) for one, box in zip(wanted, boxes, strict=True)]}
 
 
 def bound_names(limits: Sequence[Limit], axes: Axes, spots: Sequence[Spot]) -> list[Box]:
@@ -184,8 +182,8 @@ def labels(points: list[Row], spots: list[Spot], axes: Axes, limits: Sequence[Li
     pulled = [leader(spot, box) for spot, box in zip(names, boxes, strict=True) if moved(spot, box)]
     fitted = fit(steps, [*taken, *boxes], [*segments, *pulled], inside)
     return {
-        "labels": [text(axes, box, name) for (*_, name), box in zip(names, boxes, strict=True)],
-        "steps": [text(axes, box, step) for (*_, step), box in zip(steps, fitted, strict=True) if box],
+        "labels": [text(axes, name, box) for name, box in zip(names, boxes, strict=True)],
+        "steps": [text(axes, step, box) for step, box in zip(steps, fitted, strict=True) if box],
         "leaders": [
             {"x": axes.at_x(x), "y": axes.at_y(y), "x2": axes.at_x(x2), "y2": axes.at_y(y2)} for x, y, x2, y2 in pulled
         ],
@@ -205,19 +203,20 @@ def foot(axes: Axes) -> list[Box]:
     return [(left, height - LINE - 3, right, height) for left, right in ends]
 
 
-def text(axes: Axes, box: Box, words: str) -> Row:
-    """A label in its box."""
-    return {"x": axes.at_x(box[0]), "y": axes.at_y((box[1] + box[3]) / 2), "t": words}
+def text(axes: Axes, wanted: Wanted, box: Box) -> Row:
+    """A label in its box, set flush with the side on which its point is."""
+    side, edge = ("right", box[2]) if box[2] < wanted[0] else ("left", box[0])
+    return {"x": axes.at_x(edge), "y": axes.at_y((box[1] + box[3]) / 2), "t": wanted[2], "side": side}
 
 
-def moved(spot: tuple[float, float, str], box: Box) -> bool:
+def moved(wanted: Wanted, box: Box) -> bool:
     """Whether a label is so far from its point that a line must say which one it belongs to."""
-    return abs((box[1] + box[3]) / 2 - spot[1]) > LINE
+    return abs((box[1] + box[3]) / 2 - wanted[1]) > LINE / 2
 
 
-def leader(spot: tuple[float, float, str], box: Box) -> Segment:
+def leader(wanted: Wanted, box: Box) -> Segment:
     """From a point to the near end of its label."""
-    x, y, _ = spot
+    x, y, _ = wanted
     return (x, y, box[0] if box[0] > x else box[2], (box[1] + box[3]) / 2)
 
 

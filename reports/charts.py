@@ -69,6 +69,7 @@ DETAIL = alt.Detail("policy:N")
 PLACE: dict[str, Any] = {"x": alt.X("x:Q"), "y": alt.Y("y:Q")}
 ENDS: dict[str, Any] = {"x2": alt.X2("x2:Q"), "y2": alt.Y2("y2:Q")}
 TEXT = alt.Text("t:N")
+SIDE: dict[str, Any] = {"align": alt.ExprRef("datum.side")}
 BACKWARDS = alt.Order("step:Q", sort="descending")
 
 
@@ -157,15 +158,15 @@ def speed_layers(style: Style) -> dict[str, Any]:
             aim.mark_rule(color=INK, opacity=0.6, strokeDash=[2, 3]).encode(y2=ENDS["y2"]),
             aim.transform_calculate(y="datum.end").mark_text(dx=3, **small).encode(text=TEXT),
             on("limits").mark_rule(color=INK, opacity=0.5, strokeDash=[6, 3]).encode(y2=ENDS["y2"]),
-            on("limit names").mark_text(baseline="middle", **small).encode(text=TEXT),
+            on("limit names").mark_text(baseline="middle", **small | SIDE).encode(text=TEXT),
             on("front")
             .mark_line(strokeWidth=11, opacity=0.16, color=INK, strokeCap="round")
             .encode(order=alt.Order("x:Q")),
             on("intervals").mark_rule(strokeWidth=1.5, opacity=0.6).encode(color=style.color(), y2=alt.Y2("high:Q")),
             line.encode(color=style.color(), detail=DETAIL, order=BACKWARDS, strokeDash=DASH),
             mark.encode(color=style.color(), shape=style.shape(), tooltip=TOOLTIP),
-            on("labels").mark_text(align="left", fontSize=11, baseline="middle").encode(text=TEXT),
-            on("steps").mark_text(align="left", fontSize=9, opacity=0.85, baseline="middle").encode(text=TEXT),
+            on("labels").mark_text(fontSize=11, baseline="middle", **SIDE).encode(text=TEXT),
+            on("steps").mark_text(**SIDE, fontSize=9, opacity=0.85, baseline="middle").encode(text=TEXT),
             on("leaders").mark_rule(color=INK, opacity=0.45, strokeWidth=0.8).encode(**ENDS),
             cross.encode(color=style.color(), shape=style.shape(), tooltip=tooltip),
             reason.encode(text=TEXT, tooltip=tooltip),

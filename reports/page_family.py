@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from impactbench.reports import charts, charts_plain
 from impactbench.reports.chart_layout import NARROW, WIDE
 from impactbench.reports.chart_svg import Drawing, rounded
-from impactbench.reports.page_data import Rung, amount, listing, order, words
+from impactbench.reports.page_data import FLOOR, Rung, amount, listing, order, words
 from impactbench.reports.page_scores import reach
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def section(view: View, index: int, family: str, names: list[str]) -> dict[str, 
         "rungs": rung_data(view, ordered, measures) if drawn else None,
         "data": ordered,
         "others": finest_errors(view, names),
-        "laws": [row for row in differences if row["value"]],
-        "same_laws": [row for row in differences if not row["value"]],
+        "laws": [row for row in differences if abs(row["value"]) > FLOOR],
+        "same_laws": [row for row in differences if abs(row["value"]) <= FLOOR],
         "failed": failures(view, name),
     }
 

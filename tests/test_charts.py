@@ -43,13 +43,15 @@ def spec_of(view: View, frame: Frame) -> dict[str, Any]:
 
 def boxes(spec: dict[str, Any]) -> dict[str, chart_labels.Box]:
     """Where the specification's texts stand in pixels; its layers set how they are aligned."""
-    (left, right), (bottom, top) = ([math.log10(x) for x in end_of(spec, channel)] for channel in ("x", "y"))
+    (first, last), (bottom, top) = ([math.log10(x) for x in end_of(spec, channel)] for channel in ("x", "y"))
     found = {}
     for name, letter in LETTERS.items():
         for row in spec["datasets"].get(name, ()):
-            x = (math.log10(row["x"]) - left) / (right - left) * spec["width"] + (FAIL if name == "failed" else 0)
+            x = (math.log10(row["x"]) - first) / (last - first) * spec["width"] + (FAIL if name == "failed" else 0)
             y = (top - math.log10(row["y"])) / (top - bottom) * spec["height"]
-            found[f"{name}: {row['t']} at {x:.0f}, {y:.0f}"] = (x, y - 5, x + letter * len(row["t"]), y + 5)
+            width = letter * len(row["t"])
+            left = x - width if row.get("side") == "right" else x
+            found[f"{name}: {row['t']} at {x:.0f}, {y:.0f}"] = (left, y - 5, left + width, y + 5)
     return found
 
 

@@ -221,6 +221,9 @@ def test_the_specifications_keep_to_the_schema(html: str) -> None:
 
 def test_the_law_difference_is_apart(html: str) -> None:
     assert "The distance between two truths, no engine's error" in Outline(html).text
+    found = small()
+    found["law_difference"] = [{**found["law_difference"][0], "value": 1e-16}]
+    assert "The distance between two truths" not in page.render(found)  # round-off is no difference
 
 
 def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
