@@ -161,6 +161,17 @@ def test_the_slider_changes_grid_sentence_and_line_as_the_report_would(chrome: C
     assert "10 %" in chrome.js("return document.querySelector('.live svg').textContent")
 
 
+def test_the_filter_keeps_the_cases_whose_name_holds_it(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page)
+    shown = "[...document.querySelectorAll('#scores tbody tr')].filter(r => r.offsetParent).map(r => r.dataset.case)"
+    chrome.until("!document.querySelector('.control').hidden")
+    assert set(chrome.js(f"return {shown}")) == {"bounce", "stacked_drop_3"}
+    choose(chrome, "#filter", "value", "DROP", "input")
+    assert chrome.js(f"return {shown}") == ["stacked_drop_3"]
+    choose(chrome, "#filter", "value", "", "input")
+    assert len(chrome.js(f"return {shown}")) == 2
+
+
 def test_another_error_measure_is_drawn_and_tabulated(chrome: Chrome, small_page: Path) -> None:
     chrome.open(small_page)
     chrome.until(DRAWN)
