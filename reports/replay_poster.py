@@ -88,7 +88,8 @@ def closer(case: dict[str, Any], stills: list[Still]) -> dict[str, Any]:
     low = np.min([(p - reach).min(axis=0) for p in places], axis=0)
     high = np.max([(p + reach).max(axis=0) for p in places], axis=0)
     whole = case["camera"]
-    return {"low": np.maximum(low, whole["low"]), "high": np.minimum(high, whole["high"])}
+    low, high = np.maximum(low, whole["low"]), np.minimum(high, whole["high"])
+    return {"low": low, "high": high} if (low < high).all() else whole  # all have left the picture
 
 
 def radius(body: dict[str, Any]) -> float:

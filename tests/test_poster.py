@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from impactbench.reports import charts, page, replay_record, replay_tracks, replay_view
+from impactbench.reports import charts, page, replay_poster, replay_record, replay_tracks, replay_view
 from impactbench.reports.cell import Cell, case_named
 from impactbench.reports.replay_poster import HEIGHT, WIDTH
 from test_page import HOSTILE, Maker, Outline, case, document
@@ -77,6 +77,12 @@ def test_its_panels_hold_both_named_runs_and_their_bodies_large() -> None:
             assert 0 <= x - r <= x + r <= WIDTH
             assert 0 <= y - r <= y + r <= HEIGHT
         assert max(float(r) for *_, r in circles) > 10  # the replay's own box of the whole run: 3
+
+
+def test_where_all_have_left_the_picture_it_is_the_replays() -> None:
+    far = recorded(PAIR, 2.0) | {"camera": {"low": [100.0] * 3, "high": [101.0] * 3}}
+    stills = [replay_poster.Still(far, run, 0.0) for run in far["runs"]]
+    assert replay_poster.closer(far, stills) == far["camera"]
 
 
 @pytest.mark.parametrize("name", [HOSTILE, "'\"&{{ 7*7 }}", "x" * 200, "\u202eright to left \u05d0\u05d1"])
