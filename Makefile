@@ -6,7 +6,7 @@ STAMP := $(VENV)/installed
 # mypy and import-linter do not follow the editable finder; they do follow a folder of links.
 LINKS := $(VENV)/links
 
-.PHONY: compare bench test check format lint types layers tests browsers picture gallery lock clean
+.PHONY: compare bench test check format lint types layers tests measure browsers picture gallery lock clean
 
 compare: $(STAMP)
 	$(BIN)/impactbench compare --out out $(ARGS)
@@ -47,6 +47,10 @@ $(STAMP): requirements.lock pyproject.toml
 	mkdir -p $(LINKS)/impactbench
 	for part in scenarios reference adapters reports; do ln -sfn ../../../$$part $(LINKS)/impactbench/$$part; done
 	touch $@
+
+# How soon a report is drawn and how smoothly a crowd is replayed, in chromium and by the clock on the wall.
+measure: out/report.html
+	$(BIN)/python -m tests.measure_page out/report.html
 
 # Browsers for the report's tests, from Debian's packages; needs root.
 browsers:

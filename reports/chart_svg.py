@@ -32,13 +32,18 @@ def svg_of(spec: dict[str, Any], prefix: str) -> str:
     would use.
     """
     svg = str(vl_convert.vegalite_to_svg(spec))
-    svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{re.escape(prefix)}-", svg)
     svg = re.sub(r'<path class="(?:background|foreground)"[^>]*?(?:display="none"|d="M0,0h0v0h0Z")[^>]*?/>', "", svg)
-    svg = re.sub(r' (?:aria-[a-z]+|role|pointer-events|font-family|class)="[^"]*"', "", svg)
-    svg = svg.replace(' opacity="1"', "").replace(' stroke-width="1"', "")
-    svg = re.sub(r"(\d\.\d)\d{2,}", r"\1", svg)  # a tenth of a pixel
+    svg = re.sub("<[^>]*>", lambda tag: slim(tag[0], prefix), svg)  # tags only: what stands between them is text
     described = f'<svg role="img" aria-label={quoteattr(str(spec.get("description", "chart")))}'
     return svg.replace("<svg", described, 1)
+
+
+def slim(tag: str, prefix: str) -> str:
+    """One tag with ids of its own, without attributes of no use here."""
+    tag = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{re.escape(prefix)}-", tag)
+    tag = re.sub(r' (?:aria-[a-z]+|role|pointer-events|font-family|class)="[^"]*"', "", tag)
+    tag = tag.replace(' opacity="1"', "").replace(' stroke-width="1"', "")
+    return re.sub(r"(\d\.\d)\d{2,}", r"\1", tag)  # a tenth of a pixel
 
 
 def rounded(value: Any) -> Any:

@@ -16,10 +16,10 @@ from typing import Any
 import altair as alt
 from altair.utils.schemapi import debug_mode as debug_mode
 from impactbench.reports.chart_layout import (
-    FAIL_RAIL,
-    HEIGHT,
-    WIDTH,
+    FAIL,
+    WIDE,
     Axes,
+    Frame,
     Row,
     bounds,
     curves,
@@ -69,6 +69,7 @@ DETAIL = alt.Detail("policy:N")
 PLACE: dict[str, Any] = {"x": alt.X("x:Q"), "y": alt.Y("y:Q")}
 ENDS: dict[str, Any] = {"x2": alt.X2("x2:Q"), "y2": alt.Y2("y2:Q")}
 TEXT = alt.Text("t:N")
+SIDE: dict[str, Any] = {"align": alt.ExprRef("datum.side")}
 BACKWARDS = alt.Order("step:Q", sort="descending")
 
 
@@ -78,31 +79,33 @@ def work_precision(
     style: Style,
     titles: tuple[str, str],
     limits: Sequence[tuple[float, str]] = (),
+    frame: Frame = WIDE,
 ) -> dict[str, Any]:
     """Specification of cost against error, one line a policy in order of step.
 
     `points` have policy, engine, profile, step, step_text, error, cost, low, high, timed; `failed` have policy, engine,
     state, reason, steps; `titles` are those of the two axes; `limits` are errors to draw a line at, with their names.
+    A narrow `frame` is for the width of a phone.
     """
     shown = [point["error"] for point in points if point["error"] > FLOOR]
     costs = [point[key] for point in points for key in ("cost", "low", "high") if not math.isnan(point[key])]
     axes = Axes(
         span([*shown, TARGET, *(x for x, _ in limits if x > FLOOR)], 0.12),
         span([*costs, 1.6 * max(costs)], 0.15),
-        FAIL_RAIL if failed else 0,
+        frame if failed else frame._replace(fail=0),
     )
     spots = [axes.pixel(point["error"], point["cost"]) for point in points]
     data = {
-        **rails(axes),
+        **rails(axes, spots),
         **target(axes),
-        **bounds(limits, axes),
+        **bounds(limits, axes, spots),
         **curves(points, spots, axes),
-        **labels(points, spots, axes),
+        **labels(points, spots, axes, limits),
         "failed": fail_marks(failed, axes),
     }
-    spec = filled(speed_layers(style), data)
-    x_ends, y_ends = [axes.at_x(0), axes.at_x(WIDTH)], [axes.at_y(HEIGHT), axes.at_y(0)]
-    scale(spec, "x", x_ends, values=decades(axes.x), title=titles[0])
+    spec = {**filled(speed_layers(style), data), "width": frame.width, "height": frame.height}
+    x_ends, y_ends = [axes.at_x(0), axes.at_x(frame.width)], [axes.at_y(frame.height), axes.at_y(0)]
+    scale(spec, "x", x_ends, values=decades(axes.x, frame.width // 80), title=titles[0])
     scale(spec, "y", y_ends, values=decades(axes.y), title=titles[1])
     return spec
 
@@ -147,7 +150,7 @@ def speed_layers(style: Style) -> dict[str, Any]:
     mark = on("points").mark_point(size=52, filled=True, opacity=1)
     tooltip = [alt.Tooltip(field + ":N") for field in ("policy", "state", "steps", "reason")]
     cross = on("failed").mark_point(size=60, strokeWidth=1.8, filled=False, opacity=1)
-    reason = on("failed").mark_text(align="left", dx=10, fontSize=10, baseline="middle")
+    reason = on("failed").mark_text(align="left", dx=FAIL, fontSize=10, baseline="middle")
     spec = layered(
         [
             on("bands").mark_rect(opacity=0.07, fill=INK).encode(**ENDS),
@@ -155,20 +158,21 @@ def speed_layers(style: Style) -> dict[str, Any]:
             aim.mark_rule(color=INK, opacity=0.6, strokeDash=[2, 3]).encode(y2=ENDS["y2"]),
             aim.transform_calculate(y="datum.end").mark_text(dx=3, **small).encode(text=TEXT),
             on("limits").mark_rule(color=INK, opacity=0.5, strokeDash=[6, 3]).encode(y2=ENDS["y2"]),
-            on("limit names").mark_text(dx=3, **small).encode(text=TEXT),
+            on("limit names").mark_text(baseline="middle", **small | SIDE).encode(text=TEXT),
             on("front")
             .mark_line(strokeWidth=11, opacity=0.16, color=INK, strokeCap="round")
             .encode(order=alt.Order("x:Q")),
             on("intervals").mark_rule(strokeWidth=1.5, opacity=0.6).encode(color=style.color(), y2=alt.Y2("high:Q")),
             line.encode(color=style.color(), detail=DETAIL, order=BACKWARDS, strokeDash=DASH),
             mark.encode(color=style.color(), shape=style.shape(), tooltip=TOOLTIP),
-            on("labels").mark_text(align="left", fontSize=11, baseline="middle").encode(text=TEXT),
+            on("labels").mark_text(fontSize=11, baseline="middle", **SIDE).encode(text=TEXT),
+            on("steps").mark_text(**SIDE, fontSize=9, opacity=0.85, baseline="middle").encode(text=TEXT),
             on("leaders").mark_rule(color=INK, opacity=0.45, strokeWidth=0.8).encode(**ENDS),
             cross.encode(color=style.color(), shape=style.shape(), tooltip=tooltip),
             reason.encode(text=TEXT, tooltip=tooltip),
         ],
-        WIDTH,
-        HEIGHT,
+        WIDE.width,
+        WIDE.height,
     )
     for channel in ("x", "y"):
         spec["layer"][0]["encoding"][channel]["axis"]["format"] = "~g"

@@ -94,13 +94,14 @@ def _runs(diff: Diff) -> str:
 
 def terminal(diff: Diff) -> str:
     """Summary for a terminal."""
-    from impactbench.reports import terminal as plain
+    from impactbench.reports.terminal import plain
+    from impactbench.reports.terminal import table as aligned
 
-    lines = [f"{line['mark']} {line['word']}: {line['text']}" for line in verdict(diff)]
-    lines += [f"  {note}" for note in (*diff.notes, *turned(diff))]
+    lines = [plain(f"{line['mark']} {line['word']}: {line['text']}") for line in verdict(diff)]
+    lines += [plain(f"  {note}") for note in (*diff.notes, *turned(diff))]
     found = [*diff.of(WORSE), *diff.of(BETTER)]
     if found:
-        lines += ["", plain.table(COLUMNS, [row(change) for change in found[:LISTED]])]
+        lines += ["", aligned(COLUMNS, [row(change) for change in found[:LISTED]])]
     if len(found) > LISTED:
         lines.append(f"... and {len(found) - LISTED} more: the page lists them")
     return "\n".join(lines)

@@ -119,7 +119,8 @@ def _parsed(line: str) -> dict[str, Any] | None:
 
 def describe_family(name: str) -> dict[str, Any]:
     family = HARD[name]
-    first = family.make(**family.values[0])
+    made = [family.make(**values).scene for values in family.values]
+    criteria = {c.name: c for scene in made for c in criteria_of(scene)}  # boxes are asked what balls are not
     return {
         "name": name,
         "question": family.question,
@@ -127,7 +128,7 @@ def describe_family(name: str) -> dict[str, Any]:
         "policies": list(family.policies),
         "criteria": [
             {"name": c.name, "description": c.description, "limit": c.limit, "derivation": c.derivation}
-            for c in criteria_of(first.scene)
+            for c in criteria.values()
         ],
     }
 

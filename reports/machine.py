@@ -79,7 +79,8 @@ def notes(checks: dict[str, Any], elsewhere: bool) -> list[str]:
         found += _disturbed(check, when) if check else []
     if before and after and abs(after["fastest"] / before["fastest"] - 1) > UNSTEADY:
         change = after["fastest"] / before["fastest"] - 1
-        found.append(f"the processor's pace changed while times were taken: the same loop took {change:+.0%}")
+        told = f"{abs(change):.0%} {'longer' if change > 0 else 'less'} after them than before"
+        found.append(f"the processor's pace changed while times were taken: the same loop took {told}")
     if elsewhere and before:
         found.append(f"times were taken by worker {before['host']} ({before['processor']})")
     return found

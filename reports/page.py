@@ -21,6 +21,7 @@ import vl_convert
 from impactbench.reports import results, sections
 from impactbench.reports.chart_svg import drawer
 from impactbench.reports.page_data import number, percent, words
+from impactbench.reports.page_family import MAX_CHARTS
 from impactbench.reports.page_view import View
 from markupsafe import Markup, escape
 
@@ -34,15 +35,20 @@ def write_page(document: dict[str, Any], path: Path | str) -> None:
 
 
 def render(document: dict[str, Any]) -> str:
-    """The page of one results document, embedding as much of its data as fits the budget."""
+    """The page of one results document, embedding as much of its data as fits the budget; where none does, with fewer
+    charts.
+    """
     script = drawer().submit(bundle)
-    view = View(document)
-    content = {**view.content(), "extra": sections.views(document)}
     template = environment().get_template("page.html")
-    for note, data in view.embeddable():
-        page = template.render(**content, thinned=[*view.thinned, *note], data=data, bundle=script.result())
-        if len(page.encode()) <= BUDGET:
-            break
+    extra, left = sections.views(document), sections.absent(document)
+    for part in (1, 2, 4):
+        view = View(document, MAX_CHARTS // part)
+        content = {**view.content(), "extra": extra}
+        for note, data in view.embeddable():
+            thinned = [*view.thinned, *note, *left]
+            page = template.render(**content, thinned=thinned, data=data, bundle=script.result())
+            if len(page.encode()) <= BUDGET:
+                return page
     return page
 
 

@@ -51,16 +51,18 @@ def _violations(view: View) -> list[dict[str, Any]]:
         sign = "" if measure == "penetration_max" else "+" if row["value"] > 0 else "−"
         numbers = f"{words(measure)} {sign}{amount(row['size'], view.units[measure])} of the scene's own scale"
         found.append(_card(view, view.cells.loc[row["cell"]], policy, VIOLATIONS[measure], numbers, len(group)))
-        found[-1] |= {"when": _when(row), "bodies": _bodies(row), "cases": listing(group["case"], 2)}
+        end = view.cases[row["case"]]["duration"] if measure == "energy_drift" else np.nan
+        found[-1] |= {"when": _when(row, end), "bodies": _bodies(row), "cases": listing(group["case"], 2)}
     return found
 
 
-def _when(row: pd.Series) -> str:
-    return "" if pd.isna(row["time"]) else f"t = {row['time']:.4g} s"
+def _when(row: pd.Series, end: float) -> str:
+    """Time of the figure; of one that is taken at the end, the end."""
+    return next((f"t = {time:.4g} s" for time in (row["time"], end) if not pd.isna(time)), "")
 
 
 def _bodies(row: pd.Series) -> str:
-    return listing(row["bodies"]) if isinstance(row["bodies"], list) else ""
+    return listing(row["bodies"]) if isinstance(row["bodies"], list) else "all"
 
 
 def _card(view: View, cell: pd.Series, policy: str, law: str, numbers: str, count: int) -> dict[str, Any]:

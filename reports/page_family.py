@@ -7,14 +7,16 @@ import statistics
 from typing import TYPE_CHECKING, Any
 
 from impactbench.reports import charts, charts_plain
+from impactbench.reports.chart_layout import NARROW, WIDE
 from impactbench.reports.chart_svg import Drawing, rounded
-from impactbench.reports.page_data import Rung, amount, listing, order, words
+from impactbench.reports.page_data import FLOOR, Rung, amount, listing, order, words
 from impactbench.reports.page_scores import reach
 
 if TYPE_CHECKING:
     from impactbench.reports.page_view import View
 
-MAX_CHARTS = 24  # each costs some 60 kB (drawing and specification) and a quarter of a second
+MAX_CHARTS = 24
+"""Each costs some 60 kB (drawing and specification) and a quarter of a second; fewer where they do not fit."""
 
 
 def section(view: View, index: int, family: str, names: list[str]) -> dict[str, Any]:
@@ -26,7 +28,7 @@ def section(view: View, index: int, family: str, names: list[str]) -> dict[str, 
     points = view.points(name)
     ordered = sorted(points, key=lambda point: (point["policy"], point["step"]))
     orders = {policy: order(line) for policy, line in view.of(name).items()}
-    drawn = len(points) > 0 and index < MAX_CHARTS
+    drawn = len(points) > 0 and (index < view.most_charts or name == view.featured)
     differences = [row for row in view.document.get("law_difference", []) if row["case"] in names]
     measures = shown_measures(view, case, points)
     return {
@@ -45,8 +47,8 @@ def section(view: View, index: int, family: str, names: list[str]) -> dict[str, 
         "rungs": rung_data(view, ordered, measures) if drawn else None,
         "data": ordered,
         "others": finest_errors(view, names),
-        "laws": [row for row in differences if row["value"]],
-        "same_laws": [row for row in differences if not row["value"]],
+        "laws": [row for row in differences if abs(row["value"]) > FLOOR],
+        "same_laws": [row for row in differences if abs(row["value"]) <= FLOOR],
         "failed": failures(view, name),
     }
 
@@ -99,10 +101,16 @@ def speed_chart(view: View, name: str, case: dict[str, Any], points: list[Rung])
     ]
     limits += [(value, words(name)) for name, value in case.get("null", {}).items() if value]
     limits += [(case["floor"], "round-off")] if "floor" in case else []
-    spec = charts.work_precision(points, failures(view, case["name"]), view.style, titles, limits)
-    spec = rounded({**spec, "description": f"{cost} against {over}; the table below holds the same data"})
-    timed = all(point["timed"] for point in points)
-    return {"id": name, "spec": spec, "svg": Drawing(spec, name), "timed": timed, "over": over, "cost": cost}
+    silent, timed = failures(view, case["name"]), all(point["timed"] for point in points)
+    described = {"description": f"{cost} against {over}; the table below holds the same data"}
+    # The first chart is drawn once more for the width of a phone.
+    frames = {"": WIDE} | ({"narrow": NARROW} if case["name"] == view.featured else {})
+    drawings = []
+    for kind, frame in frames.items():
+        spec = rounded(charts.work_precision(points, silent, view.style, titles, limits, frame) | described)
+        own = f"{name}-{kind}" if kind else name
+        drawings.append({"id": own, "kind": kind, "spec": spec, "svg": Drawing(spec, own)})
+    return {"id": name, "drawings": drawings, "timed": timed, "over": over, "cost": cost}
 
 
 def convergence_chart(
@@ -150,7 +158,7 @@ def measure_table(view: View, case: str) -> dict[str, Any]:
         for measure in view.measures
         if measured(list(chosen.values()), measure)
     ]
-    steps = [rung["step_text"] or "none" for rung in chosen.values()]
+    steps = [f"step {rung['step_text']}" if rung["step"] > 0 else "no step" for rung in chosen.values()]
     return {"policies": list(chosen), "steps": steps, "rows": rows}
 
 

@@ -73,24 +73,29 @@ def holds(view: View) -> str:
 
 
 def fails(view: View) -> str:
+    """The worst violation with its place."""
+    found = worst(view)
+    if found is None:
+        return ""
+    rung, what = found
+    at = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
+    return f"{isolated(rung['policy'])} {what} in {isolated(rung['case'])}{at} (limit {percent(TARGET)})."
+
+
+def worst(view: View) -> tuple[pd.Series, str] | None:
     """The worst violation: energy gained, else energy lost, else the largest error at a finest step."""
     ran = view.rungs[view.rungs["state"] == "ok"]
     for measure, verb, sign in (("energy_gain", "gains", 1), ("energy_drift", "loses", -1)):
         size = sign * ran[measure] if measure in ran else pd.Series(dtype=float)
         if size.notna().any() and size.max() > TARGET:
-            return _finding(ran.loc[size.idxmax()], f"{verb} {percent(size.max())} of the energy")
+            return ran.loc[size.idxmax()], f"{verb} {percent(size.max())} of the energy"
     finest = view.finest_rungs()
     unit = finest["case"].map(view.unit_of)
     finest = finest[(unit == "1") & (finest["error"] > TARGET)]
     if not len(finest):
-        return ""
+        return None
     rung = finest.loc[finest["error"].idxmax()]
-    return _finding(rung, f"has a {words(view.cases[rung['case']]['headline'])} of {percent(rung['error'])}")
-
-
-def _finding(rung: pd.Series, what: str) -> str:
-    at = f" at {rung['step_text']} s" if rung["step"] > 0 else ""
-    return f"{isolated(rung['policy'])} {what} in {isolated(rung['case'])}{at} (limit {percent(TARGET)})."
+    return rung, f"has a {words(view.cases[rung['case']]['headline'])} of {percent(rung['error'])}"
 
 
 def take(view: View) -> str:

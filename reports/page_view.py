@@ -23,8 +23,9 @@ from impactbench.reports.page_family import MAX_CHARTS, section
 class View:
     """What the page says about one document."""
 
-    def __init__(self, document: dict[str, Any]) -> None:
+    def __init__(self, document: dict[str, Any], most_charts: int = MAX_CHARTS) -> None:
         self.document = document
+        self.most_charts = most_charts  # families that are charted
         self.cases = {case["name"]: case for case in document["cases"]}
         self.cells = tidy_cells(document)
         self.units = {row["measure"]: row.get("unit", "1") for row in document["rows"]}
@@ -97,8 +98,9 @@ class View:
         for name, case in self.cases.items():
             families.setdefault(case["family"], []).append(name)
         sections = [section(self, i, family, names) for i, (family, names) in enumerate(families.items())]
-        if len(families) > MAX_CHARTS:
-            self.thinned.append(f"Charts are drawn for the first {MAX_CHARTS} families; the others have tables only.")
+        if len(families) > self.most_charts:
+            text = f"Charts are drawn for the first {self.most_charts} families; the others have tables only."
+            self.thinned.append(text)
         if len(self.cases) > len(families):
             self.thinned.append(
                 "Each family charts one case; the others are in the scoreboard and the family's tables."
@@ -130,7 +132,10 @@ class View:
 
     def replay(self) -> dict[str, Any] | None:
         """What the replay's part of the page shows, if anything was recorded."""
-        found = replay_view.view(self.document, self.style, self.featured)
+        worst = page_verdict.worst(self)
+        family = self.cases[worst[0]["case"]]["family"] if worst else None
+        alike = [name for name, case in self.cases.items() if case["family"] == family]
+        found = replay_view.view(self.document, self.style, self.featured, alike)
         self.thinned += found["notes"] if found else []
         return found
 
@@ -143,11 +148,21 @@ class View:
 
     def embeddable(self) -> list[tuple[list[str], Any]]:
         """What to embed as data, from everything to nothing, each with the note that says what was left out."""
-        columns = ["case", "policy", "step_text", "state", "error", "cost"]
-        brief = self.rungs[columns].astype(object).where(self.rungs[columns].notna(), None)
         whole = "The raw rows are too large for this page and are in the results file beside it"
         return [
             ([], {key: part for key, part in self.document.items() if key != "replays"}),  # embedded by itself
-            ([f"{whole}; embedded here is the worst phase of every rung."], brief.to_dict("records")),
+            ([f"{whole}; embedded here is the worst phase of every rung, to six digits."], self.brief()),
             ([f"{whole}; no data is embedded here."], None),
         ]
+
+    def brief(self) -> dict[str, Any]:
+        """Every rung by case and policy: step, state, headline error, cost as in the charts; None where unknown."""
+        found: dict[str, Any] = {"columns": ["step", "state", "error", "cost"]}
+        for (case, policy), line in self.lines.items():
+            rungs = [[r["step_text"], r["state"], *(_six(r[name]) for name in ("error", "cost"))] for r in line]
+            found.setdefault("rungs", {}).setdefault(case, {})[policy] = rungs
+        return found
+
+
+def _six(value: float) -> float | None:
+    return None if math.isnan(value) else float(f"{value:.6g}")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from impactbench.adapters.frames import matrix
-from impactbench.reports.page_data import percent
-from impactbench.reports.replay_pack import restored, unpack
+from impactbench.reports.page_data import FLOOR, percent
+from impactbench.reports.replay_pack import exponential, restored, unpack
+from impactbench.reports.replay_record import SERIES
 from impactbench.scenarios.trajectory import Floats
 
 WIDTH, HEIGHT, MARGIN = 160, 120, 6
@@ -18,21 +20,31 @@ OBLIQUE = ((0.866, 0.5, 0.0), (-0.204, 0.353, 0.913))
 """Right and up of a view from above: azimuth -60 degrees, elevation 24 degrees, as the moving replay begins."""
 
 
-def poster(case: dict[str, Any], contestants: list[str], link: Callable[[str, str, float], str]) -> dict[str, Any]:
-    """Panels of the contestants where two runs first part, with a sentence and links into the replay."""
+def poster(
+    case: dict[str, Any],
+    contestants: list[str],
+    link: Callable[[str, str, float], str],
+    featured: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Panels of the contestants where two runs first part, with a sentence and links into the replay; `featured` is
+    the case the page begins with, where that is another.
+    """
     parted = case["apart"]
     time = parted["time"] if parted else 0.0
     names = list(dict.fromkeys([*(parted["runs"] if parted else []), *contestants]))[: max(2, len(contestants))]
-    runs = [run for run in case["runs"] if run["contestant"] in names]
+    stills = [Still(case, run, time) for run in case["runs"] if run["contestant"] in names]
+    view = View(case, closer(case, stills))
     panels = [
         {
-            "contestant": run["contestant"],
-            "svg": drawing(case, run, time),
-            "link": link(case["case"], run["contestant"], time),
+            "contestant": still.contestant,
+            "svg": drawing(case, still, view),
+            "error": still.error,
+            "link": link(case["case"], still.contestant, time) + "&close=1",
         }
-        for run in runs
+        for still in stills
     ]
-    return {"case": case["case"], "time": time, "panels": panels, **sentence(case)}
+    instead = featured and {"case": featured["case"], **sentence(featured)}
+    return {"case": case["case"], "time": time, "panels": panels, "instead": instead, **sentence(case)}
 
 
 def sentence(case: dict[str, Any]) -> dict[str, Any]:
@@ -43,30 +55,62 @@ def sentence(case: dict[str, Any]) -> dict[str, Any]:
     return {"runs": parted["runs"], "size": percent(parted["distance"] / case["length"]), "visible": parted["visible"]}
 
 
-def drawing(case: dict[str, Any], run: dict[str, Any], time: float) -> str:
+def share(case: dict[str, Any]) -> float:
+    """How much of their own picture lies between the two runs that part."""
+    if not (parted := case["apart"]):
+        return 0.0
+    box = closer(
+        case, [Still(case, run, parted["time"]) for run in case["runs"] if run["contestant"] in parted["runs"]]
+    )
+    return float(parted["distance"] / math.dist(box["low"], box["high"]))
+
+
+class Still:
+    """One run at one instant: places [n, 3], turns [n, 4] and colour levels of its bodies, and the truth's."""
+
+    def __init__(self, case: dict[str, Any], run: dict[str, Any], time: float) -> None:
+        n, count, truth = len(case["movable"]), run["frames"], case["truths"][run["law"]]
+        frame = min(round(time / case["frame"]), count - 1)
+        rows = (7 if run["turning"] else 3) * n
+        motion, levels, series = unpack(run["data"], (rows, count, 2), (n, count, 1), (len(SERIES), count, 1))
+        self.contestant = run["contestant"]
+        self.places, self.turns = _placed(motion[:, frame], run, n)
+        self.levels = [int(level) for level in levels[:, frame]]
+        error = float(exponential(series[SERIES.index("position_error"), frame]))
+        self.error = "" if math.isnan(error) else percent(float(f"{error:.2g}") if error > FLOOR else 0.0)
+        self.ghost = ghost_pose(case, truth, frame) if frame < truth["frames"] else None
+
+
+def closer(case: dict[str, Any], stills: list[Still]) -> dict[str, Any]:
+    """The part of the replay's box that these stills fill: bodies would be specks in the box of all times."""
+    reach = np.array([[radius(case["bodies"][index])] for index in case["movable"]])
+    places = [places for still in stills for places in (still.places, *(still.ghost or ())[:1])]
+    low = np.min([(p - reach).min(axis=0) for p in places], axis=0)
+    high = np.max([(p + reach).max(axis=0) for p in places], axis=0)
+    whole = case["camera"]
+    low, high = np.maximum(low, whole["low"]), np.minimum(high, whole["high"])
+    return {"low": low, "high": high} if (low < high).all() else whole  # all have left the picture
+
+
+def radius(body: dict[str, Any]) -> float:
+    """Of a ball around a body [m]."""
+    return float(np.linalg.norm(body["size"])) if body["kind"] == "box" else float(sum(body["size"]))
+
+
+def drawing(case: dict[str, Any], still: Still, view: View) -> str:
     """One panel as SVG: numbers only, nothing that was named by a user."""
-    view = View(case)
-    frame = min(round(time / case["frame"]), run["frames"] - 1)
-    places, turns, levels = pose(case, run, frame)
     shapes = [
         view.shape(body, body["position"], body["orientation"], "ground") for body in case["bodies"] if body["static"]
     ]
     for row, index in enumerate(case["movable"]):
-        shapes.append(view.shape(case["bodies"][index], places[row], turns[row], f"l{levels[row]}"))
-    truth = case["truths"][run["law"]]
-    if frame < truth["frames"] and (ghost := ghost_pose(case, truth, frame)) is not None:
+        shapes.append(view.shape(case["bodies"][index], still.places[row], still.turns[row], f"l{still.levels[row]}"))
+    if still.ghost is not None:
+        places, turns = still.ghost
         shapes += [
-            view.shape(case["bodies"][index], ghost[0][row], ghost[1][row], "ghost")
+            view.shape(case["bodies"][index], places[row], turns[row], "ghost")
             for row, index in enumerate(case["movable"])
         ]
     return f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" aria-hidden="true">{"".join(shapes)}</svg>'
-
-
-def pose(case: dict[str, Any], run: dict[str, Any], frame: int) -> tuple[Floats, Floats, list[int]]:
-    """Places [n, 3], turns [n, 4] and colour levels of a run's bodies in one frame."""
-    n, count = len(case["movable"]), run["frames"]
-    motion, levels = unpack(run["data"], ((7 if run["turning"] else 3) * n, count, 2), (n, count, 1))
-    return *_placed(motion[:, frame], run, n), [int(level) for level in levels[:, frame]]
 
 
 def ghost_pose(case: dict[str, Any], truth: dict[str, Any], frame: int) -> tuple[Floats, Floats] | None:
@@ -85,10 +129,10 @@ def _placed(words: Any, track: dict[str, Any], n: int) -> tuple[Floats, Floats]:
 class View:
     """From metres to the panel: along the axis that is not in the picture, or obliquely from above."""
 
-    def __init__(self, case: dict[str, Any]) -> None:
+    def __init__(self, case: dict[str, Any], box: dict[str, Any]) -> None:
         self.flat = len(case["axes"]) < 3
         self.axes = np.eye(3)[case["picture"]] if self.flat else np.array(OBLIQUE)
-        low, high = np.array(case["camera"]["low"]), np.array(case["camera"]["high"])
+        low, high = np.array(box["low"]), np.array(box["high"])
         corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T @ self.axes.T
         extent = np.ptp(corners, axis=0)
         self.scale = float(min((WIDTH - MARGIN) / extent[0], (HEIGHT - MARGIN) / extent[1]))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 from urllib.parse import quote
 
 import altair as alt
 from impactbench.reports import charts
 from impactbench.reports.page_data import percent, words
-from impactbench.reports.replay_poster import poster
+from impactbench.reports.replay_poster import poster, share
 
 SHOWN = 4
 """Panels at first."""
@@ -25,22 +24,28 @@ TITLES = {
 }
 
 
-def view(document: dict[str, Any], style: charts.Style, featured: str | None) -> dict[str, Any] | None:
-    """Values of the replay's template; None where nothing was recorded (results of an older version, or asked so)."""
+def view(
+    document: dict[str, Any], style: charts.Style, featured: str | None, telling: Collection[str] = ()
+) -> dict[str, Any] | None:
+    """Values of the replay's template; None where nothing was recorded (results of an older version, or asked so).
+
+    `featured` is the case of the first chart, `telling` are those like the one whose failure the verdict names.
+    """
     found = document.get("replays") or {}
     cases = found.get("cases", [])
     if not cases:
         return None
-    first = staged(cases, featured)
+    first = staged(cases, featured, telling)
     usual = {case["case"]: worst_of_engines(case) for case in cases}
-    picture = poster(first, usual[first["case"]], link)
+    other = next((case for case in cases if case["case"] == featured and case is not first), None)
+    picture = poster(first, usual[first["case"]], link, other)
     usual[first["case"]] = [panel["contestant"] for panel in picture["panels"]]
     names = list(dict.fromkeys(run["contestant"] for case in cases for run in case["runs"]))
     data = {
         **{key: found[key] for key in ("limit", "levels", "series", "cases")},
         "usual": usual,
         "styles": {name: {"colour": colour_of(name, style), "dash": dash_of(name)} for name in names},
-        "poster": {"case": first["case"], "time": picture["time"]},
+        "poster": {"case": first["case"], "time": picture["time"], "focus": further(first, picture["runs"])},
     }
     return {
         "data": data,
@@ -85,15 +90,22 @@ def worst_of_engines(case: dict[str, Any]) -> list[str]:
     return [run["contestant"] for run in worst.values()][:SHOWN]
 
 
-def staged(cases: list[dict[str, Any]], featured: str | None) -> dict[str, Any]:
-    """The case for the poster: the featured one if runs visibly part there, else where they part most."""
+def staged(cases: list[dict[str, Any]], featured: str | None, telling: Collection[str]) -> dict[str, Any]:
+    """The case for the poster: the featured one if runs visibly part there, else a telling one, else where they part
+    most.
+    """
 
-    def rank(case: dict[str, Any]) -> tuple[bool, bool, float]:
-        parted = case["apart"] or {"visible": False, "distance": 0.0}
-        picture = math.dist(case["camera"]["low"], case["camera"]["high"])
-        return parted["visible"], case["case"] == featured, parted["distance"] / picture
+    def rank(case: dict[str, Any]) -> tuple[bool, bool, bool, float]:
+        visible = bool(case["apart"] and case["apart"]["visible"])
+        return visible, case["case"] == featured, case["case"] in telling, share(case)
 
     return max(cases, key=rank)
+
+
+def further(case: dict[str, Any], names: Collection[str]) -> str:
+    """Of these runs the one that goes more wrong; empty where there is none."""
+    found = [run for run in case["runs"] if run["contestant"] in names]
+    return str(max(found, key=badness)["contestant"]) if found else ""
 
 
 def table(case: dict[str, Any]) -> Iterable[dict[str, Any]]:

@@ -21,6 +21,23 @@ SECTIONS: dict[str, tuple[str, str]] = {
 """Key -> (template, "module:function" that turns the part into the template's values), in the page's order."""
 
 
+COMMANDS = {
+    "hard": "hard cases: impactbench hard",
+    "limits": "breaking points: impactbench limits",
+    "metamorphic": "metamorphic relations: impactbench metamorphic",
+    "predictability": "how far motion can be predicted: impactbench predictability",
+}
+"""Key -> what a part would show and the command that measures it into the same folder."""
+
+
+def absent(document: dict[str, Any]) -> list[str]:
+    """What this page does not hold since nobody asked for it, and how to have it."""
+    missing = [told for key, told in COMMANDS.items() if key not in document.get("sections", {})]
+    if not any(cell["model"] == "full" for cell in document["cells"]):
+        missing.append("what the smallest model saves: impactbench compare --model both")
+    return [f"Not measured for this page: {'; '.join(missing)}."] if missing else []
+
+
 def attach(folder: Path, key: str, part: dict[str, Any]) -> None:
     """Write OUT/<key>.json; where results.json stands beside it, write that and the report again.
 

@@ -9,15 +9,16 @@ from impactbench.reports.markdown import code, escape, table
 from impactbench.reports.page_data import TARGET, number, percent, time_to
 from impactbench.reports.page_scores import score
 from impactbench.reports.page_view import View
+from impactbench.reports.terminal import plain
 
 LISTED = 12  # failures a summary lists
 
 
 def verdict_lines(document: dict[str, Any]) -> list[str]:
-    """Coverage and verdict as plain lines."""
+    """Coverage and verdict as lines for a terminal."""
     view = View(document)
     lines = [f"{line['mark']} {line['word']} {line['text']}" for line in page_verdict.verdict(view)]
-    return [page_verdict.coverage(view), *lines]
+    return [plain(line) for line in (page_verdict.coverage(view), *lines)]
 
 
 def markdown(document: dict[str, Any]) -> str:

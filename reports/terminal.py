@@ -35,7 +35,12 @@ def table(columns: Iterable[str], rows: Iterable[Sequence[str]], right: int = 99
 def _escape(text: str) -> str:
     from rich.markup import escape
 
-    return escape("".join(c if c.isprintable() else "?" for c in text))
+    return escape(plain(text))
+
+
+def plain(text: str) -> str:
+    """One line that a terminal shows as text: no control sequence; marks that keep a name's direction to it stay."""
+    return "".join(c if c.isprintable() or c in "\u2068\u2069" else "?" for c in text)
 
 
 def summary(document: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import axe_core_python
 import pytest
 
 WAIT = 60.0  # seconds: a busy machine with one core draws a page in a tenth of that
@@ -42,15 +43,18 @@ class Chrome:
         scripts: bool = True,
         dark: bool = False,
         calm: bool = False,
+        printed: bool = False,
     ) -> None:
-        """Load the page afresh; `calm` asks for reduced motion."""
+        """Load the page afresh; `calm` asks for reduced motion, `printed` for the print style."""
         command = self.driver.execute_cdp_cmd
         command("Emulation.setScriptExecutionDisabled", {"value": not scripts})
         scheme, motion = "dark" if dark else "light", "reduce" if calm else "no-preference"
         wanted = {"prefers-color-scheme": scheme, "prefers-reduced-motion": motion}
         features = [{"name": name, "value": value} for name, value in wanted.items()]
-        command("Emulation.setEmulatedMedia", {"features": features})
-        self.driver.set_window_size(*size)
+        command("Emulation.setEmulatedMedia", {"media": "print" if printed else "", "features": features})
+        # Exactly this, where a window has a least width.
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
+        command("Emulation.setDeviceMetricsOverride", metrics)
         self.driver.get("about:blank")
         self.driver.get_log("browser")
         self.driver.get_log("performance")
@@ -76,6 +80,21 @@ class Chrome:
         found = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
         urls = [m["params"]["request"]["url"] for m in found if m["method"] == "Network.requestWillBeSent"]
         return [url for url in urls if not url.startswith(("data:", "blob:"))]
+
+
+def busy(chrome: Chrome) -> float:
+    """Processor seconds the page's main thread has spent in tasks."""
+    metrics = chrome.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
+    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+
+def serious(chrome: Chrome) -> list[tuple[str, list[str]]]:
+    """What axe-core calls serious or critical in the open page, with the first elements concerned."""
+    chrome.js((Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8"))
+    found = chrome.driver.execute_async_script("const done = arguments[0]; axe.run().then(done)")
+    assert found["passes"]
+    bad = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
+    return [(one["id"], [node["html"][:200] for node in one["nodes"]][:5]) for one in bad]
 
 
 @contextmanager

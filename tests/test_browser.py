@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import axe_core_python
 import pytest
-from browsers import Chrome, Firefox
+from browsers import Chrome, Firefox, busy, serious
 from impactbench.reports import diff, diff_page, page, page_scores
 from impactbench.reports.page_data import TARGETS, percent
 from impactbench.reports.page_view import View
-from test_page import HOSTILE, Maker, case, document, small
+from test_charts import SPECIAL
+from test_page import HOSTILE, Maker, case, document, sixty, small
 
 DRAWN = """(() => {  // scrolls to what is not drawn yet
-  const left = document.querySelector('.chart:has(.spec):not([data-drawn])');
+  const left = [...document.querySelectorAll('.chart:has(.spec):not([data-drawn])')].find(one => one.offsetParent);
   left?.scrollIntoView();
   return !left;
 })()"""
@@ -44,7 +44,7 @@ def test_chromium_draws_the_charts_by_script_and_stays_quiet(chrome: Chrome, sma
     chrome.open(small_page)
     chrome.until(DRAWN)
     assert chrome.js("return document.querySelectorAll('.chart .live svg .mark-symbol path').length") > 20
-    assert chrome.js("return document.querySelectorAll('.chart:has(.spec) .static').length") == 0
+    assert chrome.js("return document.querySelectorAll('.chart:has(.spec):not(.narrow) .static').length") == 0
     assert chrome.console() == []
     assert chrome.requests() == [small_page.as_uri()]
 
@@ -70,6 +70,74 @@ def test_hostile_names_stay_text_after_the_script_has_drawn_them(chrome: Chrome,
     assert chrome.console() == []
 
 
+@pytest.mark.parametrize("name", SPECIAL)
+def test_hostile_names_stay_text_in_a_tooltip(name: str, chrome: Chrome, tmp_path: Path) -> None:
+    maker = Maker()
+    maker.ladder("a", f"{name}/default", 0.1, 1e-4)
+    path = tmp_path / "report.html"
+    page.write_page(document(maker, [case("a", "a")]), path)
+    chrome.open(path)
+    chrome.until(DRAWN)
+    chrome.js("""const mark = document.querySelector('.live .mark-symbol path'), box = mark.getBoundingClientRect();
+      const at = {clientX: box.x + box.width / 2, clientY: box.y + box.height / 2, bubbles: true};
+      mark.dispatchEvent(new PointerEvent('pointermove', at));""")
+    chrome.until("document.querySelector('#vg-tooltip-element.visible')")
+    tooltip = chrome.js("return document.querySelector('#vg-tooltip-element').textContent")
+    assert name[:60] in tooltip
+    assert chrome.js("return document.images.length") == 0
+    assert chrome.console() == []
+
+
+def test_a_large_page_can_be_used_within_a_second_of_the_main_threads_own_time(chrome: Chrome, tmp_path: Path) -> None:
+    path, blank = tmp_path / "report.html", tmp_path / "blank.html"
+    page.write_page(sixty(families=24), path)  # as many charts as a page draws
+    assert path.stat().st_size > 1_500_000
+    blank.write_text("<title>nothing</title>")
+    chrome.open(blank)
+    # Processor time: `make measure` tells time by the clock, which other work on the machine stretches.
+    chrome.driver.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
+    before = busy(chrome)
+    chrome.driver.get(path.as_uri())
+    loaded = busy(chrome)
+    chrome.until("document.querySelector('.first [data-drawn]')")
+    drawn = busy(chrome)
+    chrome.driver.execute_cdp_cmd("Performance.disable", {})
+    print(f"{loaded - before:.2f} s until loaded, {drawn - before:.2f} s until the first chart is drawn by script")
+    assert 0 < drawn - before < 1
+
+
+@pytest.mark.parametrize("size", [(390, 844), (320, 700)])
+def test_a_phone_shows_a_chart_of_its_width_and_nothing_sideways(
+    size: tuple[int, int], chrome: Chrome, small_page: Path
+) -> None:
+    chrome.open(small_page, size=size)
+    chrome.until(DRAWN)
+    assert chrome.js("return document.documentElement.scrollWidth") == size[0]
+    shown = chrome.js("return [...document.querySelectorAll('.first .chart')].map(one => one.offsetParent !== null)")
+    assert shown == [False, True]
+    edges = "const box = document.querySelector('.first .narrow .live svg').getBoundingClientRect();"
+    left, right = chrome.js(f"{edges} return [box.left, box.right]")
+    assert 0 <= left < right <= size[0]
+    assert right - left > 0.8 * size[0]
+
+
+def test_print_holds_charts_and_whole_tables_and_no_controls(chrome: Chrome, tmp_path: Path) -> None:
+    maker = Maker()
+    for index in range(10):
+        maker.ladder("bounce[bounciness=0.5]", f"engine{index}/default", 0.1, 1e-4)
+    path = tmp_path / "report.html"
+    page.write_page(document(maker, [case("bounce[bounciness=0.5]", "bounce")]), path)
+    sheet = 718  # A4 less 1 cm margins at 96 to the inch
+    chrome.open(path, size=(sheet, 1000), printed=True, dark=True)
+    assert chrome.js("return [...document.querySelectorAll('table')].filter(one => one.offsetParent).length") > 1
+    boxes = "[...document.querySelectorAll('table, svg, .card')].filter(one => one.getClientRects().length)"
+    assert chrome.js(f"return {boxes}.map(one => one.getBoundingClientRect().right).every(x => x <= {sheet})")
+    assert chrome.js("return [...document.querySelectorAll('.chart svg')].some(one => one.getClientRects().length)")
+    shown = "[...document.querySelectorAll('.control, nav, button')].filter(one => one.getClientRects().length).length"
+    assert chrome.js(f"return {shown}") == 0
+    assert chrome.js("return getComputedStyle(document.body).color") == "rgb(0, 0, 0)"  # whatever the scheme
+
+
 def choose(chrome: Chrome, selector: str, field: str, value: float, event: str) -> None:
     """Set a control as a user would, with its event."""
     script = "const one = document.querySelector(arguments[0]); one[arguments[1]] = arguments[2];"
@@ -91,6 +159,17 @@ def test_the_slider_changes_grid_sentence_and_line_as_the_report_would(chrome: C
     assert len(seen) > 5
     choose(chrome, "input.target", "value", TARGETS.index(0.1), "input")
     assert "10 %" in chrome.js("return document.querySelector('.live svg').textContent")
+
+
+def test_the_filter_keeps_the_cases_whose_name_holds_it(chrome: Chrome, small_page: Path) -> None:
+    chrome.open(small_page)
+    shown = "[...document.querySelectorAll('#scores tbody tr')].filter(r => r.offsetParent).map(r => r.dataset.case)"
+    chrome.until("!document.querySelector('.control').hidden")
+    assert set(chrome.js(f"return {shown}")) == {"bounce", "stacked_drop_3"}
+    choose(chrome, "#filter", "value", "DROP", "input")
+    assert chrome.js(f"return {shown}") == ["stacked_drop_3"]
+    choose(chrome, "#filter", "value", "", "input")
+    assert len(chrome.js(f"return {shown}")) == 2
 
 
 def test_another_error_measure_is_drawn_and_tabulated(chrome: Chrome, small_page: Path) -> None:
@@ -139,9 +218,4 @@ def test_axe_finds_nothing_serious(kind: str, dark: bool, chrome: Chrome, small_
     chrome.js("document.querySelectorAll('details').forEach(one => one.open = true)")
     if kind == "report":
         chrome.until(DRAWN)
-    chrome.js((Path(axe_core_python.__file__).parent / "axe.min.js").read_text(encoding="utf-8"))
-    run = "const done = arguments[0]; axe.run().then(done)"
-    found = chrome.driver.execute_async_script(run)
-    assert found["passes"]
-    bad = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
-    assert bad == [], [(one["id"], [node["html"][:200] for node in one["nodes"]][:5]) for one in bad]
+    assert serious(chrome) == []

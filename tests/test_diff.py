@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from impactbench.reports import diff, diff_page, diff_text, results, summary
 from impactbench.reports.cli_report import diff as command
 from impactbench.reports.cli_report import report
 from impactbench.reports.diff import BETTER, SAME, UNKNOWN, WORSE
+from impactbench.reports.terminal import plain
+from impactbench.reports.terminal import summary as terminal_summary
 from test_page import HOSTILE, Maker, Outline, case, document, small
 
 NASTY = (
@@ -136,6 +139,25 @@ def test_hostile_names_are_text_in_the_page_and_in_markdown(name: str) -> None:
         cells = [line.replace("\\|", "").count("|") for line in text.splitlines() if line.startswith("| ")]
         assert set(cells) <= {9, 4, 6}, text  # no name adds a column
     assert "\n" not in diff_text.row(found.changes[0])[0]
+
+
+@pytest.mark.parametrize("name", [*NASTY, "[red]a[/red]", "\x1b[31mred\x1b]0;title\x07", "a\rb\nc"])
+def test_hostile_names_are_text_in_a_terminal(name: str) -> None:
+    """No colour, no markup of the library that draws the tables, no line or direction of their own."""
+
+    def run(error: float) -> dict[str, Any]:
+        maker = Maker()
+        maker.cell(name, f"{name}/default", 60, {"position_error": error, "energy_gain": error, "wall_time": 1e-3})
+        return document(maker, [case(name, name)])
+
+    shown = plain(name)
+    for text in (
+        diff_text.terminal(diff.compare(run(0.1), run(0.2))),
+        "\n".join(summary.verdict_lines(run(0.2))),
+        terminal_summary(run(0.2)),
+    ):
+        assert not re.search("[\x00-\x09\x0b-\x1f\x7f\u202a-\u202e]", text)
+        assert shown in text.replace("\n", "") or all(part in text for part in textwrap.wrap(shown, 20))
 
 
 def save(folder: Path, found: dict[str, Any]) -> Path:

@@ -12,7 +12,7 @@ from impactbench.adapters.contestants import Contestant, select
 from impactbench.reports import hard_view, page
 from impactbench.reports.cell import Cell
 from impactbench.reports.geometry import Placed
-from impactbench.reports.hard import LINES, Journal, describe_case, plan, run
+from impactbench.reports.hard import LINES, Journal, describe_case, describe_family, plan, run
 from impactbench.reports.hard_cell import put_back, run_hard
 from impactbench.scenarios import catalogue, hard
 from impactbench.scenarios.catalogue import UnknownCase
@@ -285,3 +285,12 @@ def test_what_readers_see(tmp_path):
     assert '<td class="missed">speed 0.05 at 0.0042 s' in html
     assert "no force acts: v is constant" in html
     assert "10 m/s after one step" in html
+
+
+@pytest.mark.parametrize("name", sorted(hard.HARD))
+def test_a_family_describes_every_criterion_its_cases_are_judged_by(name):
+    described = {criterion["name"] for criterion in describe_family(name)["criteria"]}
+    asked = {
+        c for values in hard.HARD[name].values for c in describe_case(hard.HARD[name].make(**values).scene)["criteria"]
+    }
+    assert asked <= described

@@ -221,6 +221,9 @@ def test_the_specifications_keep_to_the_schema(html: str) -> None:
 
 def test_the_law_difference_is_apart(html: str) -> None:
     assert "The distance between two truths, no engine's error" in Outline(html).text
+    found = small()
+    found["law_difference"] = [{**found["law_difference"][0], "value": 1e-16}]
+    assert "The distance between two truths" not in page.render(found)  # round-off is no difference
 
 
 def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
@@ -241,7 +244,8 @@ def test_structure_for_readers_of_every_kind(html: str) -> None:
     assert len(ids) == len(set(ids))
     targets = {(attributes.get("href") or "")[1:] for tag, attributes in tags if tag == "a"}
     assert targets <= set(ids)
-    assert names.count("svg") == 3  # two of speed against error, one of error against step
+    # Two of speed against error, the first once more for a phone, one of error against step.
+    assert names.count("svg") == 4
 
 
 @pytest.mark.parametrize(
@@ -257,8 +261,8 @@ def test_hostile_names_are_text_everywhere(name: str) -> None:
     assert name in outline.text
     assert not [tag for tag, _ in outline.tags if tag == "img"]
     assert "alert(2)" not in [text.strip() for text in re.findall(r"<script>(.*?)</script>", html, re.S)]
-    # A specification, its rungs, what the script needs, the data, the library, its unpacking, the page's own.
-    assert sum(tag == "script" for tag, _ in outline.tags) == 7
+    # Two specifications, their rungs, what the script needs, the data, the library, its unpacking, the page's own.
+    assert sum(tag == "script" for tag, _ in outline.tags) == 8
     assert embedded(html, "results") == found
 
 
@@ -266,19 +270,36 @@ def test_the_rows_are_embedded(html: str) -> None:
     assert embedded(html, "results") == small()
 
 
-def test_sixty_cases_stay_within_the_budget_and_say_what_was_left_out() -> None:
+def sixty(families: int = 4) -> dict[str, Any]:
+    """Sixty cases of six policies at three phases: more than a page may hold."""
     maker = Maker()
     cases = []
     for index in range(60):
-        cases.append(case(f"case_{index}", f"family_{index // 15}"))
+        cases.append(case(f"case_{index}", f"family_{index * families // 60}"))
         for policy in ("a/default", "a/tuned", "b/default", "b/tuned", "c/tuned", "reference/stepped"):
             for _ in range(3):
                 maker.ladder(f"case_{index}", policy, 0.1, 1e-4)
-    html = page.render(document(maker, cases))
+    return document(maker, cases)
+
+
+def test_sixty_cases_stay_within_the_budget_and_say_what_was_left_out() -> None:
+    html = page.render(sixty())
     assert len(html.encode()) <= page.BUDGET
     assert "Each family charts one case" in html
     assert "too large for this page" in html
+    assert "embedded here is the worst phase of every rung" in html
+    # 0.1 at 1/30 halves with the step; 0.1 ms at 1/30 s doubles.
+    line = embedded(html, "results")["rungs"]["case_59"]["a/tuned"]
+    assert line[-2:] == [["1/60", "ok", 0.05, 0.2], ["1/30", "ok", 0.1, 0.1]]
     assert all(f"case_{index}<" in html for index in range(60))
+
+
+def test_where_no_data_fit_fewer_charts_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = page.render(sixty(families=24))
+    monkeypatch.setattr(page, "BUDGET", 1_400_000)  # the scripts of the charts take 0.4 of them
+    html = page.render(sixty(families=24))
+    assert len(html.encode()) <= 1_400_000 < len(whole.encode())
+    assert "Charts are drawn for the first 12 families; the others have tables only." in html
 
 
 def test_a_document_without_any_result_still_makes_a_page() -> None:

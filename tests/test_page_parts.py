@@ -35,6 +35,7 @@ def test_cards_name_the_worst_cell_of_each_law_and_how_to_see_it_again() -> None
     ]
     assert (found[1]["when"], found[1]["bodies"]) == ("t = 0.25 s", "ball, wall")
     assert found[2]["numbers"].startswith("energy drift −30 %")
+    assert (found[2]["when"], found[2]["bodies"]) == ("t = 1 s", "all")  # taken at the end
     assert found[2]["count"] == 2  # -0.005 is within the limit
     assert found[2]["command"] == (
         "impactbench run a --engine reference/x --step 1/60 --phase 0.25 --model full --law doc"
@@ -72,11 +73,20 @@ def test_every_repeat_is_in_the_timing_detail() -> None:
     assert "20 µs, at most 1 % of it" in timing["overhead"].replace("2e+01", "20")
 
 
+def test_what_was_not_measured_is_named_with_its_command() -> None:
+    text = page.render(small())
+    assert "hard cases: impactbench hard;" in text
+    assert "what the smallest model saves: impactbench compare --model both." in text
+    maker = Maker()
+    maker.cell("a", "x/y", 60, {"position_error": 0.1}, model="full")
+    assert "the smallest model saves: impactbench" not in page.render(document(maker, [case("a", "a")]))
+
+
 def test_null_models_and_floors_are_lines_in_the_chart() -> None:
     maker = Maker()
     maker.cell("a", "x/y", 60, {"position_error": 0.1, "null_position_error": 0.5, "floor_position_error": 1e-7})
     html = page.render(document(maker, [case("a", "a")]))
-    (spec,) = (json.loads(spec) for spec in specs(html))
+    spec, _ = (json.loads(spec) for spec in specs(html))
     rows = [row for rows in spec["datasets"].values() for row in rows]
     assert {(row["x"], row["t"]) for row in rows if "t" in row} >= {
         (0.5, "null model"),

@@ -7,10 +7,11 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from browsers import Chrome, Firefox
+from browsers import Chrome, Firefox, busy, serious
 from impactbench.reports import page
 from replay_pages import BALL, boxes, real
-from test_page import HOSTILE, small
+from test_charts import SPECIAL
+from test_page import small
 
 READY = "document.querySelector('#replay-panels canvas') && document.querySelector('#replay-plots svg')"
 FRAME = 1 / 60
@@ -82,10 +83,35 @@ def test_keys_step_jump_and_play_and_the_address_follows(chrome: Chrome, report:
     chrome.until("Number(document.getElementById('replay-time').value) > 0.03")
     press(chrome, " ")
     assert chrome.js("return document.querySelector('#replay-panels canvas').toDataURL()") != still
+    assert chrome.js("return document.createElement('canvas').getContext('webgl')") is None  # it moves without
     stopped = text(chrome, "clock")
     time = "Number(new URLSearchParams(location.hash.slice(1)).get('t'))"
     chrome.until(f"{time}.toFixed(3) + ' s' === '{stopped}'")
     assert text(chrome, "clock") == stopped  # it stands
+
+
+def test_a_close_up_fills_the_panels_with_the_bodies_and_is_part_of_the_address(chrome: Chrome, report: Report) -> None:
+    # How much of the first panel bodies cover: everything that is neither clear nor the ground's grey.
+    covered = """const canvas = document.querySelector('#replay-panels canvas');
+      const ground = getComputedStyle(document.documentElement).getPropertyValue('--panel').trim();
+      const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const grey = [1, 3, 5].map(k => parseInt(ground.slice(k, k + 2), 16));
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4)
+        if (data[i + 3] > 200 && grey.some((c, k) => Math.abs(c - data[i + k]) > 8)) count++;
+      return count / (canvas.width * canvas.height)"""
+    chrome.open(report[0], address(BALL, "pymunk/tuned", 0.1))
+    chrome.until(READY)
+    far = chrome.js(f"return (() => {{ {covered} }})()")
+    chrome.js("document.getElementById('replay-close').click()")
+    chrome.until("location.hash.endsWith('&close=1')")
+    near = chrome.js(f"return (() => {{ {covered} }})()")
+    assert near > 5 * far > 0
+    chrome.open(report[0], address(BALL, "pymunk/tuned", 0.1) + "&close=1")
+    chrome.until(READY)
+    assert chrome.js("return document.getElementById('replay-close').checked")
+    assert chrome.js(f"return (() => {{ {covered} }})()") == near
+    assert chrome.js("return document.querySelector('.poster a').hash").endswith("&close=1")
 
 
 def test_buttons_jump_to_what_the_harness_found(chrome: Chrome, report: Report) -> None:
@@ -121,6 +147,17 @@ def test_a_click_on_a_point_opens_its_replay_and_says_which_step(chrome: Chrome,
     assert text(chrome, "clock") == f"{violation['time']:.3f} s"
 
 
+@pytest.mark.parametrize("size", [(1366, 768), (390, 844)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_axe_finds_nothing_serious_beside_a_replay(
+    dark: bool, size: tuple[int, int], chrome: Chrome, report: Report
+) -> None:
+    chrome.open(report[0], address(BALL, "mujoco/default", 0.9), dark=dark, size=size)
+    chrome.until(READY)
+    assert chrome.js("return document.querySelectorAll('.poster svg').length") > 1
+    assert serious(chrome) == []
+
+
 def test_firefox_draws_the_replay_and_stays_quiet(firefox: Firefox, report: Report) -> None:
     firefox.open(report[0], address(BALL, "mujoco/default", 0.9))
     firefox.until(READY)
@@ -143,13 +180,20 @@ def test_without_scripts_poster_and_numbers_stand_and_no_dead_controls(chrome: C
     assert hidden
 
 
-def test_names_stay_text_in_the_replay(chrome: Chrome, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", [*SPECIAL, "\u202eright to left \u05d0\u05d1"])
+def test_names_stay_text_in_the_replay(name: str, chrome: Chrome, tmp_path: Path) -> None:
     path = tmp_path / "hostile.html"
-    boxes(path, 4, (f"{HOSTILE}/default", "b/two"))
-    chrome.open(path, address("crowd", f"{HOSTILE}/default", 0.5))
+    own = f"{name}/default"
+    boxes(path, 4, (own, "b/two"))
+    chrome.open(path, address("crowd", own, 0.5))
     chrome.until(READY)
-    assert value(chrome, "focus") == f"{HOSTILE}/default"
+    assert value(chrome, "focus") == own
+    # Panels, boxes to choose them, the title of the plots, the poster: the name and nothing made of it.
+    for place in ("#replay-panels", "#replay-runs", "#replay-plots-title", ".poster"):
+        assert own in chrome.js(f"return document.querySelector('{place}').textContent")
+    assert own in chrome.js("return document.querySelector('#replay-panels canvas').getAttribute('aria-label')")
     assert chrome.js("return document.querySelectorAll('img').length") == 0
+    assert chrome.js("return document.documentElement.scrollWidth") == 1366
     assert chrome.console() == []
 
 
@@ -184,12 +228,6 @@ def test_300_boxes_in_four_panels_and_the_overlay_can_be_drawn_30_times_a_second
     print(f"{frames} frames in 1.5 s; {1000 * each:.1f} ms of the main thread each")
     assert frames
     assert each <= 1 / 30
-
-
-def busy(chrome: Chrome) -> float:
-    """Processor seconds the page's main thread has spent in tasks."""
-    metrics = chrome.driver.execute_cdp_cmd("Performance.getMetrics", {})["metrics"]
-    return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
 
 
 def test_results_without_replays_still_make_a_page() -> None:

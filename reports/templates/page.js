@@ -65,6 +65,7 @@ const watcher = new IntersectionObserver((entries) => {
   for (const entry of entries) {
     if (!entry.isIntersecting) continue;
     watcher.unobserve(entry.target);
+    if (entry.target.scrollWidth > entry.target.clientWidth) entry.target.tabIndex = 0; // keys scroll it
     drawSpeed(entry.target);
   }
 }, { rootMargin: "300px" });
@@ -208,7 +209,7 @@ async function remeasure(select) {
   const figure = select.closest("figure"), section = document.querySelector(`section[data-case="${CSS.escape(figure.dataset.case)}"]`);
   const rungs = jsonOf(figure.querySelector(".rungs")), pick = select.selectedIndex;
   const name = select.value + (rungs.units[pick] === "1" ? " (1 = the scene's own scale)" : ` [${rungs.units[pick]}]`);
-  const box = figure.querySelector(".chart");
+  const box = [...figure.querySelectorAll(".chart")].find((one) => one.offsetParent); // the wide or the narrow one
   const spec = jsonOf(box.querySelector(".spec"));
   const spent = spec.layer[0].encoding.y.axis.title;
   watcher.unobserve(box);
@@ -220,7 +221,8 @@ async function remeasure(select) {
     await draw(order, plain(points(steps, pick, ([step, , error]) => [step, error]), "step [s]", name));
   }
   tabulate(section, rungs, pick, name);
-  box.dataset.measure = select.value;
+  if (pick) box.dataset.measure = select.value;
+  else delete box.dataset.measure;
 }
 
 /** Follow #scenario=NAME to the case's section, or to its row where no chart shows it; #...&t= is the replay's. */

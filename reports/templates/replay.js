@@ -72,11 +72,19 @@ async function layOut() {
   draw(scene);
 }
 
+/** Of the panels' runs and, where they are known, of their truths. */
+function shownMotions(scene) {
+  const runs = panels.filter((panel) => panel.run).map((panel) => panel.run);
+  const truths = [...new Set(runs.map((run) => run.law))].map((law) => ghostAt(scene, law, state.time));
+  return [...runs.map((run) => run.motion), ...truths.filter(Boolean)];
+}
+
 /** Every panel at the present time. */
 function draw(scene) {
+  const box = part("close").checked ? closer(scene, shownMotions(scene), state.time) : scene.camera;
   for (const panel of panels) {
     const { pen, run, width, height } = panel;
-    const camera = cameraOf(scene, state.angle, width, height);
+    const camera = cameraOf(scene, state.angle, width, height, box);
     if (run) {
       drawPanel(pen, camera, scene, run, ghostAt(scene, run.law, state.time), state.time, ink, still.matches);
       panel.text.textContent = caption(scene, run);
@@ -226,13 +234,15 @@ function remember() {
 }
 
 const addressOf = (scene, engine, time) =>
-  `#scenario=${encodeURIComponent(scene)}&engine=${encodeURIComponent(engine)}&t=${Number(time.toFixed(4))}`;
+  `#scenario=${encodeURIComponent(scene)}&engine=${encodeURIComponent(engine)}&t=${Number(time.toFixed(4))}` +
+  (part("close").checked ? "&close=1" : "");
 
-/** Follow `#scenario=...&engine=...&t=...`; false where the address holds none. */
+/** Follow `#scenario=...&engine=...&t=...`, seen close up with `&close=1`; false where the address holds none. */
 function follow() {
   const wanted = new URLSearchParams(location.hash.slice(1));
   if (!wanted.has("scenario")) return false;
   const time = Number(wanted.get("t") ?? 0);
+  part("close").checked = wanted.has("close");
   open(wanted.get("scenario"), wanted.get("engine") ?? "", Number.isFinite(time) ? time : 0);
   part("section").scrollIntoView();
   player.focus({ preventScroll: true });
@@ -277,6 +287,7 @@ function start() {
   part("time").addEventListener("input", () => { if (state.playing) play(false); seek(Number(part("time").value)); });
   part("speed").addEventListener("change", () => { state.speed = Number(part("speed").value); });
   part("angle").addEventListener("input", async () => { state.angle = Number(part("angle").value); draw(await sceneOf(state.scene)); });
+  part("close").addEventListener("change", () => seek(state.time));
   part("scene").addEventListener("change", () => open(part("scene").value, "", 0).then(remember));
   part("focus").addEventListener("change", () => open(state.scene, part("focus").value, state.time).then(remember));
   part("runs").addEventListener("change", () => {
@@ -292,6 +303,7 @@ function start() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", layOut);
   player.hidden = false;
   const poster = recorded.poster ?? { case: recorded.cases[0].case, time: 0 };
+  part("close").checked = true; // what the poster shows
   if (!follow()) open(poster.case, poster.focus ?? "", poster.time);
 }
 

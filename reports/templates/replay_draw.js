@@ -65,9 +65,10 @@ function valueOf(word) {
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** Look along the axis that is not in the picture, or obliquely from above; the box of the scene fills the panel.
- *  @param {any} scene @param {number} angle degrees about the vertical @returns {Camera} */
-function cameraOf(scene, angle, width, height) {
+/** Look along the axis that is not in the picture, or obliquely from above; the box [m] fills the panel.
+ *  @param {any} scene @param {number} angle degrees about the vertical @param { {low: number[], high: number[]} } box
+ *  @returns {Camera} */
+function cameraOf(scene, angle, width, height, box) {
   let right, up, toward;
   if (scene.axes.length < 3) {
     [right, up] = scene.picture.map((axis) => [0, 1, 2].map((k) => Number(k === axis)));
@@ -79,12 +80,28 @@ function cameraOf(scene, angle, width, height) {
     right = [-Math.sin(a), Math.cos(a), 0];
     up = [-Math.sin(e) * Math.cos(a), -Math.sin(e) * Math.sin(a), Math.cos(e)];
   }
-  const { low, high } = scene.camera;
+  const { low, high } = box;
   const corners = [...Array(8).keys()].map((i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high[k] : low[k])));
   const [us, vs] = [right, up].map((axis) => corners.map((corner) => dot(corner, axis)));
   const [u, v] = [us, vs].map((all) => (Math.min(...all) + Math.max(...all)) / 2);
   const wide = Math.max(...us) - Math.min(...us), tall = Math.max(...vs) - Math.min(...vs);
   return { right, up, toward, scale: Math.min((width - 16) / wide, (height - 16) / tall), u, v, width, height };
+}
+
+/** The part of the scene's box that the bodies fill at a time, as in the poster.
+ *  @param {any} scene @param {Motion[]} motions @param {number} time */
+function closer(scene, motions, time) {
+  const low = [...scene.camera.high], high = [...scene.camera.low];
+  for (const motion of motions)
+    for (const { place, body, row } of posesAt(scene, motion, time)) {
+      if (row < 0) continue;
+      const reach = body.kind === "box" ? Math.hypot(...body.size) : body.size.reduce((sum, size) => sum + size);
+      for (let k = 0; k < 3; k++) {
+        low[k] = Math.min(low[k], Math.max(place[k] - reach, scene.camera.low[k]));
+        high[k] = Math.max(high[k], Math.min(place[k] + reach, scene.camera.high[k]));
+      }
+    }
+  return low.every((value, k) => value < high[k]) ? { low, high } : scene.camera; // all have left the picture
 }
 
 const acrossOf = (camera, p) => camera.width / 2 + (dot(p, camera.right) - camera.u) * camera.scale;
