@@ -97,7 +97,7 @@ def balance(
 
     change: scratch like `velocity`; what a unit step along the search direction does to velocities.
     """
-    free = push > 0.0
+    free, pushed = push > 0.0, bodies_of(first, second, len(velocity))
     lack, along = np.zeros(len(push)), np.zeros(len(push))
     size = 0.0
     for c in range(len(push)):
@@ -106,7 +106,8 @@ def balance(
             along[c] = mass[c] * lack[c]
             size += lack[c] * along[c]
     for _ in range(10 * len(push) + 20):
-        change[:] = 0.0
+        for i in pushed:
+            change[i, 0] = change[i, 1] = change[i, 2] = 0.0
         for c in range(len(push)):
             if free[c]:
                 give(change, inverse_mass, first[c], second[c], normal, c, along[c])
@@ -127,7 +128,7 @@ def balance(
                 lack[c] -= length * closing(change, first[c], second[c], normal, c)
                 worst = max(worst, abs(lack[c]))
                 size += lack[c] * mass[c] * lack[c]
-        for i in range(len(velocity)):
+        for i in pushed:
             for k in range(3):
                 velocity[i, k] += length * change[i, k]
         if length == most:
@@ -137,6 +138,15 @@ def balance(
             return
         for c in range(len(push)):
             along[c] = mass[c] * lack[c] + size / before * along[c]
+
+
+@compiled
+def bodies_of(first: Indices, second: Indices, count: int) -> Indices:
+    """Numbers of the bodies, of `count`, that are in any contact."""
+    held = np.zeros(count, dtype=np.bool_)
+    for c in range(len(first)):
+        held[first[c]] = held[second[c]] = True
+    return np.nonzero(held)[0]
 
 
 @inlined

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from impactbench.reference.contestant import LARGE, AllPairs, Stepped
+from impactbench.reference.contestant import LARGE, Particles, Stepped
 from impactbench.reference.particles import BOX, HALF_SPACE, SPHERE
 from impactbench.reference.swarm import NEAR_SIDES, PAIRS, SIDES, SKIN, from_arrays
 from impactbench.reference.swarm_run import Gas, advanced, prepared, tally
@@ -109,7 +109,7 @@ def mixed(d, seed=3):
 @pytest.mark.parametrize("law", ["doc", "nc"])
 def test_a_step_is_that_of_the_stepped_runner(d, law):
     world = mixed(d)
-    slow, fast = AllPairs(world, law, "stepped", world.model, STEP), Gas(world, world.model, STEP)
+    slow, fast = Particles(world, law, "stepped", world.model, STEP), Gas(world, world.model, STEP)
     for _ in range(12):
         slow.advance(20)
         fast.advance(20)

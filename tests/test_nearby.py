@@ -1,0 +1,167 @@
+"""Which pairs the particle runner looks at: none that may touch is missing, and a run on those near is the run on all
+pairs, bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from impactbench.reference.cells import build_cells, gather
+from impactbench.reference.coefficients import build_coefficients
+from impactbench.reference.contestant import PROFILES, Particles
+from impactbench.reference.gaps import locate_all
+from impactbench.reference.nearby import all_pairs, build_nearby, list_anew, within_room
+from impactbench.reference.pair_list import no_pairs
+from impactbench.reference.particles import build_bodies
+from impactbench.scenarios.crowds import heap, wall
+from impactbench.scenarios.records import Body, Box, Contact, HalfSpace, Model, Scene, Sphere
+
+STEP = 1 / 240
+ALL, NEAR = 10**9, 0
+"""So many pairs are few."""
+
+
+def crowd(seed: int, count: int, ratio: float, axes=(0, 1, 2)) -> Scene:
+    """Spheres and boxes of sizes over 10^ratio, among statics of all kinds; some pairs have their own contact."""
+    rng = np.random.default_rng(seed)
+    spread = 2 * count ** (1 / len(axes))
+    bodies = [Body("floor", HalfSpace((0.0, 0.0, 1.0)), None, (0.0, 0.0, 0.0))]
+    for i in range(count):
+        size = float(10 ** rng.uniform(-ratio, 0)) / 2
+        shape = Sphere(size) if rng.random() < 0.5 else Box(tuple((size * rng.uniform(0.3, 1, 3)).tolist()))
+        place = np.zeros(3)
+        place[list(axes)] = rng.uniform(-spread / 2, spread / 2, len(axes))
+        place[2] += spread / 2 + 0.5
+        speed = np.zeros(3)
+        speed[list(axes)] = rng.normal(size=len(axes)) * 10 ** rng.uniform(-1, 1)
+        mass = None if rng.random() < 0.2 else float(10 ** rng.uniform(-1, 1))
+        bodies.append(
+            Body(f"{i}", shape, mass, tuple(place.tolist()), (0.0, 0.0, 0.0) if mass is None else tuple(speed))
+        )
+    own = Contact(bounciness=0.9, friction=0.1, viscosity=0.2)
+    pairs = tuple((str(a), str(b), own) for a, b in rng.integers(0, count, (count, 2)).tolist() if a != b)
+    return Scene(
+        name="crowd",
+        bodies=tuple(outside(bodies)),
+        duration=1.0,
+        model=Model(axes, gravity=True, friction=True),
+        length=1.0,
+        speed=1.0,
+        energy=1.0,
+        gravity=(0.0, 0.0, -9.81),
+        contact=Contact(bounciness=0.4, friction=0.3, viscosity=0.5),
+        pairs=pairs,
+    )
+
+
+def outside(bodies: list[Body]) -> list[Body]:
+    """Without the movable bodies whose centre may lie within a static one: those are refused."""
+
+    def inside(body: Body, static: Body) -> bool:
+        half = static.shape.half_extents if isinstance(static.shape, Box) else (static.shape.radius,) * 3
+        away = np.abs(np.array(body.position) - static.position)
+        return bool((away <= half).all())
+
+    solids = [b for b in bodies if b.static and not isinstance(b.shape, HalfSpace)]
+    return [b for b in bodies if b.static or not any(inside(b, s) for s in solids)]
+
+
+def bits(world: Scene, law: str, profile: str, few: int, parts: int = 6) -> list[bytes]:
+    """Positions and velocities every ten steps; how it ended where contacts did not settle."""
+    run = Particles(world, law, profile, world.model, STEP, few)
+    found = []
+    for _ in range(parts):
+        try:
+            run.advance(10)
+        except RuntimeError as why:
+            return [*found, str(why).encode()]
+        state = run.read()
+        found.append(state.positions.tobytes() + state.velocities.tobytes())
+    return found
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize("law", ["doc", "nc"])
+@given(st.integers(0, 10_000), st.integers(2, 60), st.floats(0, 2), st.sampled_from([(2,), (0, 2), (0, 1, 2)]))
+@settings(max_examples=15, deadline=None)
+def test_a_run_on_the_pairs_near_is_the_run_on_all_pairs(profile, law, seed, count, ratio, axes):
+    world = crowd(seed, count, ratio, axes)
+    assert bits(world, law, profile, NEAR) == bits(world, law, profile, ALL)
+
+
+def test_a_wall_of_bricks_falls_the_same_on_the_pairs_near():
+    world = wall(6, 6)
+    assert bits(world, "doc", "stepped", NEAR, 24) == bits(world, "doc", "stepped", ALL, 24)
+
+
+def test_of_a_crowd_only_pairs_that_are_near_are_listed():
+    world = heap(1000)
+    run = Particles(world, "nc", "stepped", world.model, STEP)
+    run.advance(60)
+    # Twelve touch a ball at most; half of them are listed with it, and a few more are near, and the walls.
+    assert len(run._pairs.first) < 12 * 1000
+
+
+@given(st.integers(0, 10_000), st.integers(1, 80), st.floats(0, 3), st.floats(0, 0.5))
+@settings(max_examples=60, deadline=None)
+def test_lists_hold_exactly_the_pairs_whose_gap_is_within_the_room_of_both(seed, count, ratio, reach):
+    world = crowd(seed, count, ratio)
+    bodies, coefficients = build_bodies(world), build_coefficients(world)
+    nearby = build_nearby(world, bodies, coefficients, np.ones(3), STEP)
+    assert not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, reach) or not world.movable
+    near = list_anew(bodies, no_pairs(), nearby, reach)
+    every = all_pairs(world, bodies, coefficients)
+    locate_all(bodies, every)
+    wanted = every.gap <= nearby.room[every.first] + nearby.room[every.second]
+    for name in ("first", "second", "bounciness", "friction", "viscosity"):
+        assert getattr(near, name).tolist() == getattr(every, name)[wanted].tolist()
+    assert within_room(bodies.position, nearby.movable, nearby.built, nearby.room, reach)
+    assert (bodies.inverse_mass[near.second] > 0).all()
+
+
+@given(st.integers(0, 10_000), st.integers(1, 200), st.floats(0, 3), st.floats(0, 3))
+@settings(max_examples=60, deadline=None)
+def test_cells_find_everybody_in_the_way_of_a_cube_once(seed, count, ratio, extent):
+    rng = np.random.default_rng(seed)
+    place, size = rng.normal(size=(count, 3)) * 5, 10 ** rng.uniform(-ratio, 0, count)
+    place[rng.random(count) < 0.1] *= 1e9
+    size[rng.random(count) < 0.1] = 0.0
+    cells = build_cells(np.arange(count), place, size, np.ones(3))
+    found = np.zeros(count, dtype=np.int64)
+    for at in (np.zeros(3), place[0]):
+        seen: list[int] = []
+        for level in range(len(cells.exponent)):
+            seen += found[: gather(cells, level, at, extent, found)].tolist()
+        assert len(seen) == len(set(seen))
+        assert set(np.flatnonzero((np.abs(place - at) <= extent + size[:, None]).all(axis=1))) <= set(seen)
+
+
+def test_bodies_that_leave_leave_the_lists():
+    world = heap(200)
+
+    def run(few: int) -> tuple[Particles, list[bytes]]:
+        engine = Particles(world, "nc", "stepped", world.model, STEP, few)
+        engine.on_contact(lambda _time, one, other: [other] if one == "floor" else [])
+        states = []
+        for _ in range(120):
+            engine.advance(1)
+            states.append(engine.read().positions.tobytes())
+        return engine, states
+
+    near, found = run(NEAR)
+    assert found == run(ALL)[1]
+    assert 0 < len(near.read().positions) < 200
+
+
+def test_own_contacts_of_pairs_count_by_name_the_first_of_several():
+    world = crowd(1, 4, 0.0)
+    first, other = (world.bodies[i].name for i in (0, world.movable[0]))
+    twice = replace(world, pairs=((first, other, Contact(0.1, 0.2, 0.3)), (other, first, Contact(0.4, 0.5, 0.6))))
+    pairs = all_pairs(twice, build_bodies(twice), build_coefficients(twice))
+    own = (pairs.first == 0) & (pairs.second == world.movable[0])
+    assert (pairs.bounciness[own], pairs.friction[own], pairs.viscosity[own]) == (0.1, 0.2, 0.3)
+    assert set(pairs.bounciness[~own].tolist()) == {0.4}
