@@ -11,10 +11,11 @@ import numpy as np
 from impactbench.reference.callback import Callback, asked_to_leave, without
 from impactbench.reference.coefficients import build_coefficients, refuse_reversal
 from impactbench.reference.interlocked import refuse_interlocked
-from impactbench.reference.nearby import Nearby, build_nearby, list_all
+from impactbench.reference.nearby import Nearby, build_nearby, list_all, list_anew
 from impactbench.reference.pair_list import no_pairs
 from impactbench.reference.pairs import pair_counts
 from impactbench.reference.particles import build_bodies, check_supported
+from impactbench.reference.progress import build_progress
 from impactbench.reference.rigid_run import RigidBodies
 from impactbench.reference.stepped import SWEEPS, Rules, run, start
 from impactbench.reference.swarm_run import Gas, why_not
@@ -116,7 +117,11 @@ class Particles:
             refuse_reversal(scene, self._nearby.coefficients, self._bodies.inverse_mass)
         _, one_way, two_way = pair_counts(len(scene.statics), len(scene.movable))
         every = one_way + two_way <= few
-        pairs = list_all(scene, self._bodies, self._nearby) if every else no_pairs()
+        if every:
+            self._pairs = list_all(scene, self._bodies, self._nearby)
+        else:
+            self._pairs = list_anew(self._bodies, no_pairs(), self._nearby, self._rules.touch)
+        self._progress = build_progress(len(scene.bodies))
         self.settings: Mapping[str, object] = {
             "order": "detect, impacts, gravity, lasting contacts and friction, move, " + strategy,
             "options": PROFILES[profile],
@@ -125,7 +130,7 @@ class Particles:
             "negligible speed [m/s]": self._rules.still,
             "sweeps at most": SWEEPS,
         }
-        self._pairs = start(self._bodies, pairs, self._nearby, self._rules)
+        start(self._bodies, self._pairs, self._rules)
 
     def on_contact(self, callback: Callback) -> None:
         self._callback = callback
@@ -145,20 +150,26 @@ class Particles:
         self._bodies, self._pairs, kept = without(self._bodies, self._pairs, leaving)
         self._scene = replace(self._scene, bodies=tuple(self._scene.bodies[i] for i in kept))
         self._movable = np.array(self._scene.movable, dtype=np.int64)
-        built, room = self._nearby.built[kept], self._nearby.room[kept]
-        self._nearby = self._build_nearby()._replace(built=built, room=room)
+        self._progress = build_progress(len(kept))
+        rooms, self._nearby = self._nearby.rooms, self._build_nearby()
+        self._nearby.rooms.centre[:], self._nearby.rooms.size[:] = rooms.centre[kept], rooms.size[kept]
 
     def _build_nearby(self) -> Nearby:
         coefficients = build_coefficients(self._scene, self._force_step)
         return build_nearby(self._scene, self._bodies, coefficients, self._rules.carried, self._rules.step)
 
     def _run(self, steps: int) -> None:
-        done, self._pairs = run(self._bodies, self._pairs, self._nearby, self._rules, steps)
-        self._done += done
-        if done < steps:
-            time = self._done * self._rules.step
-            name = self._scene.name
-            raise RuntimeError(f"{name}: contacts did not settle within {SWEEPS} sweeps at t = {time:.6g} s")
+        end = self._done + steps
+        while self._done < end:
+            self._done += run(
+                self._bodies, self._pairs, self._nearby.rooms, self._progress, self._rules, end - self._done
+            )
+            if (reach := self._progress.wanted[0]) > 0:
+                self._pairs = list_anew(self._bodies, self._pairs, self._nearby, reach)
+                self._progress.wanted[0] = 0.0
+            elif self._done < end:
+                time, name = self._done * self._rules.step, self._scene.name
+                raise RuntimeError(f"{name}: contacts did not settle within {SWEEPS} sweeps at t = {time:.6g} s")
 
     def read(self) -> State:
         return State(self._bodies.position[self._movable], self._bodies.velocity[self._movable])

@@ -20,6 +20,7 @@ from impactbench.reference.gaps import between, locate
 from impactbench.reference.pair_list import in_order, no_pairs, relisted, remembered
 from impactbench.reference.pairs import handled_pairs
 from impactbench.reference.particles import HALF_SPACE, Bodies, Indices, Pairs
+from impactbench.reference.progress import Progress
 from impactbench.scenarios.records import Scene
 from impactbench.scenarios.trajectory import Floats
 
@@ -27,18 +28,25 @@ SKIN, AHEAD = 0.1, 4.0
 """A body's room: so much of the bodies' mean half width, and its way in so many steps."""
 
 
-class Nearby(NamedTuple):
-    """movable, planes: numbers of the movable bodies and the half-spaces; solids: the other statics. built [m] [n, 3]:
-    places at the last listing; room [m] [n]; spare [m]: the room of a body at rest; ahead [s]: time a moving one gets.
-    along: 1 on the axes along which anything moves.
+class Rooms(NamedTuple):
+    """movable: numbers of the movable bodies. centre [m] [n, 3]: places at the last listing; size [m] [n]: how far a
+    body may go from there.
     """
 
     movable: Indices
+    centre: Floats
+    size: Floats
+
+
+class Nearby(NamedTuple):
+    """planes: numbers of the half-spaces; solids: the other statics. spare [m]: the room of a body at rest; ahead [s]:
+    what a moving one gets is its way in that time. along: 1 on the axes along which anything moves.
+    """
+
+    rooms: Rooms
     planes: Indices
     solids: Cells
     coefficients: Coefficients
-    built: Floats
-    room: Floats
     spare: float
     ahead: float
     along: Floats
@@ -49,14 +57,12 @@ def build_nearby(scene: Scene, bodies: Bodies, coefficients: Coefficients, along
     movable = np.array(scene.movable if scene.collide else (), dtype=np.int64)
     extent = half_width(bodies)
     return Nearby(
-        movable=movable,
+        rooms=Rooms(movable, bodies.position.copy(), np.where(bodies.inverse_mass > 0, -1.0, 0.0)),
         planes=np.flatnonzero(bodies.shape == HALF_SPACE),
         solids=build_cells(
             np.flatnonzero((bodies.inverse_mass == 0) & (bodies.shape != HALF_SPACE)), bodies.position, extent, along
         ),
         coefficients=coefficients,
-        built=bodies.position.copy(),
-        room=np.where(bodies.inverse_mass > 0, -1.0, 0.0),
         spare=SKIN * float(extent[movable].mean()) if len(movable) else 0.0,
         ahead=AHEAD * step,
         along=along,
@@ -65,7 +71,7 @@ def build_nearby(scene: Scene, bodies: Bodies, coefficients: Coefficients, along
 
 def list_all(scene: Scene, bodies: Bodies, nearby: Nearby) -> Pairs:
     """All handled pairs, for good: room without end."""
-    nearby.room[nearby.movable] = np.inf
+    nearby.rooms.size[nearby.rooms.movable] = np.inf
     return all_pairs(scene, bodies, nearby.coefficients)
 
 
@@ -115,11 +121,12 @@ def squared_way(position: Floats, origin: Floats, i: int) -> float:
 
 
 @compiled
-def within_room(position: Floats, movable: Indices, built: Floats, room: Floats, reach: float) -> bool:
-    """Whether all pairs within `reach` [m] are still listed."""
-    for i in movable:
-        left = room[i] - reach
-        if left < 0 or squared_way(position, built, i) > left * left:
+def all_listed(position: Floats, rooms: Rooms, progress: Progress, reach: float) -> bool:
+    """Whether all pairs within `reach` [m] are still listed; where not, `progress` wants them."""
+    for i in rooms.movable:
+        left = rooms.size[i] - reach
+        if left < 0 or squared_way(position, rooms.centre, i) > left * left:
+            progress.wanted[0] = reach
             return False
     return True
 
@@ -127,11 +134,11 @@ def within_room(position: Floats, movable: Indices, built: Floats, room: Floats,
 @compiled
 def list_anew(bodies: Bodies, pairs: Pairs, nearby: Nearby, reach: float) -> Pairs:
     """Give every movable body its room, and list the pairs within it and those whose contact is not over."""
-    for i in nearby.movable:
+    for i in nearby.rooms.movable:
         v = bodies.velocity[i]
         speed = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        nearby.room[i] = 2 * reach + nearby.spare + nearby.ahead * speed
-    nearby.built[:] = bodies.position
+        nearby.rooms.size[i] = 2 * reach + nearby.spare + nearby.ahead * speed
+    nearby.rooms.centre[:] = bodies.position
     kept = remembered(pairs, nearby.coefficients.rank)
     keys = np.concatenate((near_keys(bodies, nearby), kept))
     return relisted(pairs, in_order(keys, len(bodies.inverse_mass)), bodies, nearby.coefficients)
@@ -140,12 +147,12 @@ def list_anew(bodies: Bodies, pairs: Pairs, nearby: Nearby, reach: float) -> Pai
 @compiled
 def near_keys(bodies: Bodies, nearby: Nearby) -> Indices:
     """Keys of the pairs whose gap is within the room of both."""
-    room, rank = nearby.room, nearby.coefficients.rank
+    room, rank = nearby.rooms.size, nearby.coefficients.rank
     extent, place, solids = half_width(bodies) + room, bodies.position, nearby.solids
-    cells = build_cells(nearby.movable, place, extent, nearby.along)
+    cells = build_cells(nearby.rooms.movable, place, extent, nearby.along)
     found, keys, count = np.zeros(len(rank), dtype=np.int64), np.zeros(64 + 16 * len(rank), dtype=np.int64), 0
     found[: len(nearby.planes)] = nearby.planes
-    for i in nearby.movable:
+    for i in nearby.rooms.movable:
         seen, own = len(nearby.planes), exponent_of(extent[i])
         for level in range(len(solids.exponent)):
             seen += gather(solids, level, place[i], extent[i], found[seen:])

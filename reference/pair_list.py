@@ -74,7 +74,7 @@ def relisted(old: Pairs, keys: Indices, bodies: Bodies, coefficients: Coefficien
         bounciness=np.zeros(count),
         friction=np.zeros(count),
         viscosity=np.zeros(count),
-        gap=np.zeros(count),
+        gap=np.full(count, np.inf),
         normal=np.zeros((count, 3)),
         touching=np.zeros(count, dtype=np.bool_),
         touched=np.zeros(count, dtype=np.bool_),
@@ -104,6 +104,7 @@ def copy_pair(old: Pairs, p: int, new: Pairs, q: int) -> None:
     """Coefficients and memory of pair p of one list to pair q of another."""
     new.bounciness[q], new.friction[q], new.viscosity[q] = old.bounciness[p], old.friction[p], old.viscosity[p]
     new.touching[q], new.touched[q], new.reach[q] = old.touching[p], old.touched[p], old.reach[p]
+    new.gap[q] = old.gap[p]
     new.slow[q], new.push[q], new.parted[q], new.clear[q] = old.slow[p], old.push[p], old.parted[p], old.clear[p]
     for k in range(3):
         new.normal[q, k] = old.normal[p, k]

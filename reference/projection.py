@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 from impactbench.reference.compiled import compiled, inlined
-from impactbench.reference.nearby import Nearby, list_anew, look, within_room
+from impactbench.reference.nearby import Rooms, all_listed, look
 from impactbench.reference.particles import Bodies, Indices, Pairs
+from impactbench.reference.progress import Progress
 from impactbench.reference.pushes import Holds, hold_all
 from impactbench.reference.responses import exchange, reduced, relative
 from impactbench.scenarios.trajectory import Floats
@@ -24,25 +25,31 @@ TIMES = 20
 
 
 @compiled
-def project(bodies: Bodies, pairs: Pairs, nearby: Nearby, gravity: Floats, touch: float, still: float) -> Pairs:
+def project(
+    bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, gravity: Floats, touch: float, still: float
+) -> bool:
     """Move overlapping bodies apart until none is deeper than `touch`/2 [m], and let them pay. still [m/s]: none.
-    Returns the list of pairs; `parted` says how far each was pushed apart.
+    `parted` says how far each pair was pushed apart. Returns False, to go on from there, if a new list is wanted.
 
     A heap that needs more than `TIMES` keeps its rest of overlap for the next step.
     """
-    pairs.parted[:] = 0.0
-    for _ in range(TIMES):
+    while True:
+        if not all_listed(bodies.position, rooms, progress, touch):
+            return False
+        if progress.stage[1] == TIMES:
+            break
         deepest = look(bodies, pairs, touch)
         if deepest <= touch / 2:
             break
-        if not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, 4 * deepest):
-            pairs = list_anew(bodies, pairs, nearby, 4 * deepest)
+        if not all_listed(bodies.position, rooms, progress, 4 * deepest):
+            return False
         look(bodies, pairs, 4 * deepest)
         separate(bodies, pairs, np.nonzero(pairs.gap < 4 * deepest)[0], gravity, touch / 16)
-        if not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, touch):
-            pairs = list_anew(bodies, pairs, nearby, touch)
-    pay(bodies, pairs, np.nonzero(pairs.gap <= touch)[0], still)
-    return pairs
+        progress.stage[1] += 1
+    if progress.stage[1] > 0:
+        pay(bodies, pairs, np.nonzero(pairs.gap <= touch)[0], still)
+    progress.stage[1] = 0
+    return True
 
 
 @compiled

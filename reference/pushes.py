@@ -43,14 +43,13 @@ def hold_all(velocity: Floats, inverse_mass: Floats, holds: Holds, tolerance: fl
     Returns the last change.
     """
     first, second, normal, push, mass, ahead = holds
-    change = np.zeros_like(velocity)
     worst = 0.0
     for _ in range(ROUNDS):
         for turn in range(SWEEPS):
             worst = sweep(velocity, inverse_mass, first, second, normal, push, mass, ahead, turn % 2 == 0)
             if worst <= tolerance:
                 return worst
-        balance(velocity, inverse_mass, first, second, normal, push, mass, ahead, change, tolerance / 4)
+        balance(velocity, inverse_mass, first, second, normal, push, mass, ahead, tolerance / 4)
     return worst
 
 
@@ -90,13 +89,10 @@ def balance(
     push: Floats,
     mass: Floats,
     ahead: Floats,
-    change: Floats,
     tolerance: float,
 ) -> None:
-    """Conjugate gradients on the contacts that push. Ends where a push would turn into a pull: that contact lets go.
-
-    change: scratch like `velocity`; what a unit step along the search direction does to velocities.
-    """
+    """Conjugate gradients on the contacts that push. Ends where a push would turn into a pull: that contact lets go."""
+    change = np.zeros_like(velocity)  # what a unit step along the search direction does to velocities
     free, pushed = push > 0.0, bodies_of(first, second, len(velocity))
     lack, along = np.zeros(len(push)), np.zeros(len(push))
     size = 0.0

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from impactbench.reference.compiled import compiled
 from impactbench.reference.gaps import locate
-from impactbench.reference.nearby import Nearby, list_anew, look, squared_way, within_room
+from impactbench.reference.nearby import Rooms, all_listed, look, squared_way
 from impactbench.reference.particles import Bodies, Indices, Pairs
+from impactbench.reference.progress import BEGIN, MOVED, Progress
 from impactbench.reference.projection import follow, project
 from impactbench.reference.responses import damp, hold, relative, resolve_impacts
 from impactbench.scenarios.trajectory import Floats
@@ -46,49 +47,39 @@ class Rules(NamedTuple):
 
 
 @compiled
-def run(bodies: Bodies, pairs: Pairs, nearby: Nearby, rules: Rules, steps: int) -> tuple[int, Pairs]:
-    """Advance by `steps`. Returns how many were done, fewer if lasting contacts found no common solution in `SWEEPS`,
-    and the list of pairs by then.
-
-    A list is handed on only where it is a new one: to count the references to its arrays takes longer than the step of
-    a few bodies.
+def run(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules: Rules, steps: int) -> int:
+    """Advance by `steps`. Returns how many were done: fewer where contacts found no common solution in `SWEEPS`, or
+    where a new list of pairs is wanted, as `progress` says.
     """
-    movable, built, room = nearby.movable, nearby.built, nearby.room
-    last = np.empty_like(bodies.position)
-    # What is left after all sweeps is harmless below the speed that a contact may have anyway: the next step goes on
-    # from there.
-    harmless = max(rules.still, 2 * rules.step * math.sqrt((rules.gravity**2).sum()))
     for done in range(steps):
-        before, rest = meet_and_move(bodies, pairs, rules, last)
+        if progress.stage[0] == BEGIN:
+            meet_and_move(bodies, pairs, progress, rules)
+            progress.stage[0] = MOVED
         if rules.revert:
-            pairs = revert(bodies, pairs, nearby, rules, last, before)
+            apart = revert(bodies, pairs, rooms, progress, rules)
         else:
-            if not within_room(bodies.position, movable, built, room, rules.touch):
-                pairs = list_anew(bodies, pairs, nearby, rules.touch)
-            if look(bodies, pairs, rules.touch) > rules.touch / 2:
-                pairs = project(bodies, pairs, nearby, rules.gravity, rules.touch, rules.still)
-                if rules.positions:
-                    follow(bodies, pairs, rules.step)
-        if rest > harmless:
-            return done, pairs
-    return steps, pairs
+            apart = project(bodies, pairs, rooms, progress, rules.gravity, rules.touch, rules.still)
+        if not apart:
+            return done
+        if rules.positions:
+            follow(bodies, pairs, rules.step)
+        progress.stage[0] = BEGIN
+        # What is left after all sweeps is harmless below the speed that a contact may have anyway: the next step goes
+        # on from there.
+        if progress.rest[0] > max(rules.still, 2 * rules.step * math.sqrt((rules.gravity**2).sum())):
+            return done
+    return steps
 
 
-@compiled
-def start(bodies: Bodies, pairs: Pairs, nearby: Nearby, rules: Rules) -> Pairs:
+def start(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
     """Contacts that touch at t = 0 are lasting ones (documents, rule R3)."""
-    if not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, rules.touch):
-        pairs = list_anew(bodies, pairs, nearby, rules.touch)
     detect(bodies, pairs, rules.touch)
     pairs.touched[:] = pairs.touching
-    return pairs
 
 
 @compiled
-def meet_and_move(bodies: Bodies, pairs: Pairs, rules: Rules, last: Floats) -> tuple[Floats, float]:
-    """All of a step but what keeps bodies apart. Writes where they were to `last` [m]. Returns their velocities [m/s]
-    before gravity acted, and the change of velocity [m/s] at which lasting contacts stopped.
-    """
+def meet_and_move(bodies: Bodies, pairs: Pairs, progress: Progress, rules: Rules) -> None:
+    """All of a step but what keeps bodies apart."""
     active = detect(bodies, pairs, rules.touch)
     slow_approach(pairs, active, rules)
     for p in active:
@@ -103,19 +94,19 @@ def meet_and_move(bodies: Bodies, pairs: Pairs, rules: Rules, last: Floats) -> t
     lasting = active[parting(bodies, pairs, active) <= 1e3 * rules.still]
     pairs.push[:] = 0.0
     pairs.push[lasting] = weight[lasting]
-    last[:] = bodies.position
-    before = bodies.velocity.copy()
+    before = progress.before
+    before[:], progress.last[:] = bodies.velocity, bodies.position
     for i in range(len(bodies.inverse_mass)):
         if bodies.inverse_mass[i] > 0:
             bodies.velocity[i] += rules.step * rules.gravity
-    rest = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
+    progress.rest[0] = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
     if rules.doc:
         damp(bodies, pairs, lasting, rules.step, rules.still)
 
     bodies.velocity[:] *= rules.carried
     bodies.position[:] += rules.step / 2 * (before + bodies.velocity) * rules.carried
     pairs.touched[:] = pairs.touching
-    return before, rest
+    pairs.parted[:] = 0.0
 
 
 @compiled
@@ -148,19 +139,19 @@ def parting(bodies: Bodies, pairs: Pairs, active: Indices) -> Floats:
 
 
 @compiled
-def revert(bodies: Bodies, pairs: Pairs, nearby: Nearby, rules: Rules, last: Floats, before: Floats) -> Pairs:
+def revert(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules: Rules) -> bool:
     """Put overlapping bodies back to where the step began, with the velocity they had there (documents, rule R4).
 
     A body put back may now be in another's way, which goes back as well; at most every body does. Pairs that
     overlapped count as touching across the gap that is left, so that the next step treats their contact; after that
-    only across a gap of 2 g h^2, so that a body held further off falls on. Returns the list of pairs.
+    only across a gap of 2 g h^2, so that a body held further off falls on. Returns False, having done
+    nothing, if a new list of pairs is wanted.
     """
-    furthest = 0.0
+    last, before, furthest = progress.last, progress.before, 0.0
     for i in range(len(last)):
         furthest = max(furthest, squared_way(bodies.position, last, i))
-    reach = rules.touch + 2 * math.sqrt(furthest) * (1 + 1e-9)
-    if not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, reach):
-        pairs = list_anew(bodies, pairs, nearby, reach)
+    if not all_listed(bodies.position, rooms, progress, rules.touch + 2 * math.sqrt(furthest) * (1 + 1e-9)):
+        return False
     back = np.zeros(len(bodies.inverse_mass), dtype=np.bool_)
     met = np.zeros(len(pairs.first), dtype=np.bool_)
     for _ in range(len(back) + 1):
@@ -182,4 +173,4 @@ def revert(bodies: Bodies, pairs: Pairs, nearby: Nearby, rules: Rules, last: Flo
         if met[p]:
             locate(bodies, pairs, p)
             pairs.reach[p] = max(0.0, pairs.gap[p])
-    return pairs
+    return True

@@ -14,9 +14,10 @@ from impactbench.reference.cells import build_cells, gather
 from impactbench.reference.coefficients import build_coefficients
 from impactbench.reference.contestant import PROFILES, Particles
 from impactbench.reference.gaps import locate_all
-from impactbench.reference.nearby import all_pairs, build_nearby, list_anew, within_room
+from impactbench.reference.nearby import all_listed, all_pairs, build_nearby, list_anew
 from impactbench.reference.pair_list import no_pairs
 from impactbench.reference.particles import build_bodies
+from impactbench.reference.progress import build_progress
 from impactbench.scenarios.crowds import heap, wall
 from impactbench.scenarios.records import Body, Box, Contact, HalfSpace, Model, Scene, Sphere
 
@@ -112,14 +113,16 @@ def test_lists_hold_exactly_the_pairs_whose_gap_is_within_the_room_of_both(seed,
     world = crowd(seed, count, ratio)
     bodies, coefficients = build_bodies(world), build_coefficients(world)
     nearby = build_nearby(world, bodies, coefficients, np.ones(3), STEP)
-    assert not within_room(bodies.position, nearby.movable, nearby.built, nearby.room, reach) or not world.movable
+    progress = build_progress(len(world.bodies))
+    assert not all_listed(bodies.position, nearby.rooms, progress, reach) or not world.movable
+    assert progress.wanted[0] == reach or not world.movable
     near = list_anew(bodies, no_pairs(), nearby, reach)
     every = all_pairs(world, bodies, coefficients)
     locate_all(bodies, every)
-    wanted = every.gap <= nearby.room[every.first] + nearby.room[every.second]
+    wanted = every.gap <= nearby.rooms.size[every.first] + nearby.rooms.size[every.second]
     for name in ("first", "second", "bounciness", "friction", "viscosity"):
         assert getattr(near, name).tolist() == getattr(every, name)[wanted].tolist()
-    assert within_room(bodies.position, nearby.movable, nearby.built, nearby.room, reach)
+    assert all_listed(bodies.position, nearby.rooms, progress, reach)
     assert (bodies.inverse_mass[near.second] > 0).all()
 
 
@@ -165,3 +168,23 @@ def test_own_contacts_of_pairs_count_by_name_the_first_of_several():
     own = (pairs.first == 0) & (pairs.second == world.movable[0])
     assert (pairs.bounciness[own], pairs.friction[own], pairs.viscosity[own]) == (0.1, 0.2, 0.3)
     assert set(pairs.bounciness[~own].tolist()) == {0.4}
+
+
+def test_a_contact_that_is_not_over_stays_listed_with_its_memory():
+    """A pair that touched a moment ago, though it is far apart by now; the one that only was near is forgotten."""
+    world = crowd(1, 30, 0.0)
+    bodies, coefficients = build_bodies(world), build_coefficients(world)
+    nearby = build_nearby(world, bodies, coefficients, np.ones(3), STEP)
+    old = list_anew(bodies, no_pairs(), nearby, 0.5)
+    p, q = np.flatnonzero(bodies.inverse_mass[old.first] > 0)[:2]
+    for name, value in (("reach", 0.25), ("push", 2.0), ("slow", 3.0), ("parted", 4.0), ("clear", 5.0)):
+        getattr(old, name)[p] = value
+    old.touching[p] = old.touched[p] = True
+    old.normal[p] = (0.0, 0.6, 0.8)
+    for number, i in enumerate(world.movable):
+        bodies.position[i] = (0.0, 0.0, 1000.0 * (number + 2))
+    new = list_anew(bodies, old, nearby, 0.0)
+    assert (new.first.tolist(), new.second.tolist()) == ([old.first[p]], [old.second[p]])
+    for name in ("bounciness", "touching", "touched", "reach", "push", "slow", "parted", "clear", "normal"):
+        assert getattr(new, name)[0].tolist() == getattr(old, name)[p].tolist()
+    assert (old.first[q], old.second[q]) != (old.first[p], old.second[p])
