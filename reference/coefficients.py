@@ -88,11 +88,14 @@ def refuse_reversal(scene: Scene, coefficients: Coefficients, inverse_mass: Floa
     own = coefficients.key.tolist()
     lightest = np.argsort(-inverse_mass, kind="stable").tolist()
     n, by_rank = len(inverse_mass), np.argsort(coefficients.rank)
+    if not scene.collide:
+        return
     pairs = [(int(by_rank[key // n]), key % n, c) for key, c in zip(own, coefficients.own[:, 2], strict=True)]
     listed = set(own)
     for place, a in enumerate(lightest):
-        later = (b for b in lightest[place + 1 :] if pair_key(coefficients.rank, a, b) not in listed)
-        pairs += [(a, b, coefficients.usual[2]) for b in islice(later, 1)]
+        others = (lightest[k] for k in range(place + 1, n))
+        usual = (b for b in others if pair_key(coefficients.rank, a, b) not in listed)
+        pairs += [(a, b, coefficients.usual[2]) for b in islice(usual, 1)]
     for a, b, c in pairs:
         ratio = c * coefficients.force_step * (inverse_mass[a] + inverse_mass[b])
         if ratio > 1:

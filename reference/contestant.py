@@ -77,7 +77,9 @@ class Stepped:
         physics. The bodies it names leave then; `read` gives the others, in the scene's order. Particles only.
         """
         if not isinstance(self._runner, Particles):
-            raise Unsupported("contacts are reported by the runner of up to 64 particles only")
+            raise Unsupported(
+                "contacts are reported by the runner of particles only, not of elastic gases or rigid bodies"
+            )
         self._runner.on_contact(callback)
 
     def figures(self) -> Mapping[str, float]:

@@ -7,7 +7,7 @@ the same moment is compiled here beforehand.
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from impactbench.reference.contestant import LARGE, Stepped
@@ -18,15 +18,28 @@ from impactbench.scenarios.records import Body, HalfSpace, Model, Scene, Sphere
 STEP = 1 / 60
 
 
-def warm_up(_: object = None) -> None:
-    """The kernels of the scenes that are compared: a ball falls on a floor under either law, a gas in the plane."""
+def warm_up(part: str | None = None) -> None:
+    """The kernels of the scenes that are compared, or one of the `PARTS` of them."""
+    with _no_collection():
+        for name, run in PARTS.items():
+            if part in (None, name):
+                run()
+
+
+def _fall(runner: type[Stepped | Exact], profile: str) -> None:
+    """A ball falls on a floor under either law."""
     ball = Body("ball", Sphere(0.5), 1.0, (0.0, 0.0, 1.0))
     floor = Body("floor", HalfSpace((0.0, 0.0, 1.0)), None, (0.0, 0.0, 0.0))
     scene = Scene("warm_up", (ball, floor), 1.0, Model((2,), gravity=True), 1.0, 1.0, 1.0, gravity=(0.0, 0.0, -9.81))
-    with _no_collection():
-        for law in scene.laws:
-            Exact(scene, law, "exact", scene.model, STEP).advance(1)
-        _step(scene, gas(LARGE + 1, 2))
+    for law in scene.laws:
+        runner(scene, law, profile, scene.model, STEP).advance(1)
+
+
+PARTS: dict[str, Callable[[], None]] = {
+    "particles": lambda: _fall(Stepped, "stepped"),
+    "exact": lambda: _fall(Exact, "exact"),
+    "gas": lambda: _step(gas(LARGE + 1, 2)),
+}
 
 
 def warm_up_crowds() -> None:

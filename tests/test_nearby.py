@@ -4,6 +4,7 @@ pairs, bit for bit.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from impactbench.reference.cells import build_cells, gather
-from impactbench.reference.coefficients import build_coefficients
+from impactbench.reference.coefficients import build_coefficients, refuse_reversal
 from impactbench.reference.contestant import PROFILES, Particles
 from impactbench.reference.gaps import locate_all
 from impactbench.reference.nearby import all_listed, all_pairs, build_nearby, list_anew
@@ -188,3 +189,15 @@ def test_a_contact_that_is_not_over_stays_listed_with_its_memory():
     for name in ("bounciness", "touching", "touched", "reach", "push", "slow", "parted", "clear", "normal"):
         assert getattr(new, name)[0].tolist() == getattr(old, name)[p].tolist()
     assert (old.first[q], old.second[q]) != (old.first[p], old.second[p])
+
+
+@given(st.integers(0, 10_000), st.integers(2, 12), st.floats(0.001, 0.2))
+@settings(max_examples=60, deadline=None)
+def test_a_force_is_refused_where_any_of_all_pairs_would_be_reversed(seed, count, step):
+    world = crowd(seed, count, 0.0)
+    bodies, coefficients = build_bodies(world), build_coefficients(world, step)
+    every = all_pairs(world, bodies, build_coefficients(world))
+    rate = every.viscosity * (bodies.inverse_mass[every.first] + bodies.inverse_mass[every.second])
+    refused = rate.max(initial=0.0) * step > 1
+    with pytest.raises(ValueError, match="would reverse the sliding") if refused else nullcontext():
+        refuse_reversal(world, coefficients, bodies.inverse_mass)
