@@ -166,9 +166,9 @@ class Particles:
             self._done += run(
                 self._bodies, self._pairs, self._nearby.rooms, self._progress, self._rules, end - self._done
             )
-            if (reach := self._progress.wanted[0]) > 0:
+            if (reach := self._progress.wanted[0]) >= 0:
                 self._pairs = list_anew(self._bodies, self._pairs, self._nearby, reach)
-                self._progress.wanted[0] = 0.0
+                self._progress.wanted[0] = -1.0
             elif self._done < end:
                 time, name = self._done * self._rules.step, self._scene.name
                 raise RuntimeError(f"{name}: contacts did not settle within {SWEEPS} sweeps at t = {time:.6g} s")

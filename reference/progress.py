@@ -18,7 +18,7 @@ class Progress(NamedTuple):
     """last [m], before [m/s] [n, 3]: places at the step's begin, velocities there before gravity acted.
 
     stage [2]: `BEGIN` or `MOVED`, and how often overlaps were taken back since. rest [m/s] [1]: change of velocity at
-    which lasting contacts stopped. wanted [m] [1]: the list of pairs must reach so far; 0 where it does.
+    which lasting contacts stopped. wanted [m] [1]: the list of pairs must reach so far; negative where it does.
     """
 
     last: Floats
@@ -35,5 +35,5 @@ def build_progress(bodies: int) -> Progress:
         before=np.zeros((bodies, 3)),
         stage=np.zeros(2, dtype=np.int64),
         rest=np.zeros(1),
-        wanted=np.zeros(1),
+        wanted=np.full(1, -1.0),
     )

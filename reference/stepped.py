@@ -144,8 +144,8 @@ def revert(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules
 
     A body put back may now be in another's way, which goes back as well; at most every body does. Pairs that
     overlapped count as touching across the gap that is left, so that the next step treats their contact; after that
-    only across a gap of 2 g h^2, so that a body held further off falls on. Returns False, having done
-    nothing, if a new list of pairs is wanted.
+    only across a gap of 2 g h^2, so that a body held further off falls on. Returns False, having done nothing, if
+    a new list of pairs is wanted.
     """
     last, before, furthest = progress.last, progress.before, 0.0
     for i in range(len(last)):

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -181,38 +177,6 @@ def test_many_bad_bodies_are_refused_by_name_and_field():
         bodies[7] = replace(bodies[7], **change)
         with pytest.raises(ValueError, match=message):
             Stepped(replace(crowd, bodies=tuple(bodies)), "doc", "stepped", crowd.model, STEP)
-
-
-DIGEST = """
-import hashlib
-from impactbench.reference.contestant import Stepped
-from impactbench.scenarios.crowds import gas
-world = gas(300, 3, 0.2)
-run = Stepped(world, "doc", "stepped", world.model, 1 / 240)
-run.advance(240)
-state = run.read()
-print(hashlib.sha256(state.positions.tobytes() + state.velocities.tobytes()).hexdigest())
-"""
-
-
-def test_identical_bits_from_run_to_run_and_for_one_or_two_threads():
-    found = {
-        subprocess.run(
-            [sys.executable, "-c", DIGEST],
-            env={**os.environ, "NUMBA_NUM_THREADS": threads},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for threads in ("1", "2")
-    }
-    world = gas(300, 3, 0.2)
-    run = Stepped(world, "doc", "stepped", world.model, STEP)
-    for _ in range(240):  # nor does it matter in how many calls
-        run.advance(1)
-    state = run.read()
-    found.add(hashlib.sha256(state.positions.tobytes() + state.velocities.tobytes()).hexdigest() + "\n")
-    assert len(found) == 1
 
 
 def test_order_of_bodies_and_mirroring_change_no_more_than_round_off():
