@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from impactbench.reference.contestant import LARGE, Particles, Stepped
 from impactbench.reference.particles import BOX, HALF_SPACE, SPHERE
-from impactbench.reference.swarm import NEAR_SIDES, PAIRS, SIDES, SKIN, from_arrays
+from impactbench.reference.swarm import BLOCK, NEAR_SIDES, PAIRS, SIDES, SKIN, from_arrays
 from impactbench.reference.swarm_run import Gas, advanced, prepared, tally
 from impactbench.reference.swarm_statics import build_statics
 from impactbench.scenarios.crowds import gas
@@ -148,6 +148,22 @@ def test_lists_grow_where_a_crowd_is_dense():
     assert swarm.tally[PAIRS] > room
     assert len(listed(swarm, PAIRS, swarm.lists.pairs)) == swarm.tally[PAIRS]
     assert np.isfinite(advanced(swarm, 5).now.place).all()
+
+
+@dimensions
+def test_bodies_have_moved_before_their_pairs_are_looked_at(d):
+    """Unlike sizes, so that pairs of several levels follow one another in the list."""
+    n = 6000
+    rng = np.random.default_rng(4)
+    place = np.concatenate(
+        [rng.uniform(0, {1: 60, 2: 5, 3: 1.5}[d], (n, d)), 10 ** rng.uniform(-2, -1, (n, 1))], axis=1
+    )
+    swarm = prepared(from_arrays(place, np.zeros((n, d + 1)), np.ones(n), no_statics(d), STEP, 1e-10, 1e-13))
+    numbers = swarm.lists.pairs[: 2 * swarm.tally[PAIRS]]
+    assert len(numbers) > 4 * BLOCK
+    furthest = np.maximum.accumulate(numbers)[2 * BLOCK - 1 :: 2 * BLOCK]
+    assert (swarm.lists.until[: len(furthest)] == furthest + 1).all()
+    assert swarm.lists.until[(len(numbers) // 2 - 1) // BLOCK] == numbers.max() + 1
 
 
 def test_large_scenes_take_the_fast_path_and_others_do_not():
