@@ -15,12 +15,13 @@ from impactbench.reference.cells import build_cells, gather
 from impactbench.reference.coefficients import build_coefficients, refuse_reversal
 from impactbench.reference.contestant import PROFILES, Particles
 from impactbench.reference.gaps import locate_all
+from impactbench.reference.interlocked import Centres, depth
 from impactbench.reference.nearby import all_listed, all_pairs, build_nearby, list_anew
 from impactbench.reference.pair_list import no_pairs
 from impactbench.reference.particles import build_bodies
 from impactbench.reference.progress import build_progress
 from impactbench.scenarios.crowds import heap, wall
-from impactbench.scenarios.records import Body, Box, Contact, HalfSpace, Model, Scene, Sphere
+from impactbench.scenarios.records import Body, Box, Capsule, Contact, HalfSpace, Model, Scene, Sphere
 
 STEP = 1 / 240
 ALL, NEAR = 10**9, 0
@@ -201,3 +202,18 @@ def test_a_force_is_refused_where_any_of_all_pairs_would_be_reversed(seed, count
     refused = rate.max(initial=0.0) * step > 1
     with pytest.raises(ValueError, match="would reverse the sliding") if refused else nullcontext():
         refuse_reversal(world, coefficients, bodies.inverse_mass)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 60), st.floats(0, 3))
+@settings(max_examples=60, deadline=None)
+def test_no_body_inside_a_static_is_missed(seed, count, ratio):
+    rng = np.random.default_rng(seed)
+    solids = [body for body in crowd(seed, count, ratio).bodies if not isinstance(body.shape, HalfSpace)]
+    solids += [replace(body, shape=Capsule(0.2, 0.5), orientation=(0.6, 0.0, 0.8, 0.0)) for body in solids[:5]]
+    places = [np.array(body.position) + rng.normal(size=3) * 0.3 for body in solids for _ in range(3)]
+    points = [Body(f"{i}", Sphere(0.0), 1.0, tuple(place.tolist())) for i, place in enumerate(places)]
+    near = Centres(points)
+    for solid in solids:
+        inside = [point for point in points if depth(solid, point.position) > 0]
+        found = near.within(solid)
+        assert [point for point in found if depth(solid, point.position) > 0] == inside
