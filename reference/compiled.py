@@ -42,9 +42,10 @@ def inlined(kernel: Kernel) -> Kernel:
 
 
 def _compile(kernel: Kernel, **options: bool) -> Kernel:
+    """Without the second entry that numba makes for callbacks of C: nobody calls it, and it takes time to compile."""
     usual = config.CACHE_DIR
     config.CACHE_DIR = str(STORE)  # read once, by the next line; other users of numba keep their own
     try:
-        return cast(Kernel, njit(cache=True, error_model="numpy", **options)(kernel))
+        return cast(Kernel, njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel))
     finally:
         config.CACHE_DIR = usual

@@ -17,22 +17,26 @@ Gap = tuple[float, float, float, float]
 @inlined
 def locate(bodies: Bodies, pairs: Pairs, p: int) -> None:
     """Bring gap and normal of pair p up to date."""
-    a, b = pairs.first[p], pairs.second[p]
+    gap, x, y, z = between(bodies, pairs.first[p], pairs.second[p])
+    pairs.gap[p] = gap
+    pairs.normal[p, 0], pairs.normal[p, 1], pairs.normal[p, 2] = x, y, z
+
+
+@inlined
+def between(bodies: Bodies, a: int, b: int) -> Gap:
+    """Gap and normal of two bodies; a half-space comes first."""
     x_a, x_b, size_a, size_b = bodies.position[a], bodies.position[b], bodies.size[a], bodies.size[b]
     box_a, box_b = bodies.shape[a] == BOX, bodies.shape[b] == BOX
     if bodies.shape[a] == HALF_SPACE:
-        gap, x, y, z = above_plane(x_a, size_a, x_b, size_b, box_b)
-    elif box_a and box_b:
-        gap, x, y, z = between_boxes(x_a, size_a, x_b, size_b)
-    elif box_a:
-        gap, x, y, z = box_to_sphere(x_a, size_a, x_b, size_b[0])
-    elif box_b:
+        return above_plane(x_a, size_a, x_b, size_b, box_b)
+    if box_a and box_b:
+        return between_boxes(x_a, size_a, x_b, size_b)
+    if box_a:
+        return box_to_sphere(x_a, size_a, x_b, size_b[0])
+    if box_b:
         gap, x, y, z = box_to_sphere(x_b, size_b, x_a, size_a[0])
-        x, y, z = -x, -y, -z
-    else:
-        gap, x, y, z = between_spheres(x_a, size_a[0], x_b, size_b[0])
-    pairs.gap[p] = gap
-    pairs.normal[p, 0], pairs.normal[p, 1], pairs.normal[p, 2] = x, y, z
+        return gap, -x, -y, -z
+    return between_spheres(x_a, size_a[0], x_b, size_b[0])
 
 
 @compiled
@@ -40,29 +44,6 @@ def locate_all(bodies: Bodies, pairs: Pairs) -> None:
     """Bring all gaps and normals up to date."""
     for p in range(len(pairs.first)):
         locate(bodies, pairs, p)
-
-
-@compiled
-def look(bodies: Bodies, pairs: Pairs, touch: float) -> None:
-    """Bring the gaps up to date; of pairs that cannot have met since they were seen apart, to a lower bound above
-    `touch`.
-    """
-    travel = 0.0
-    for i in range(len(bodies.inverse_mass)):
-        x = bodies.position[i, 0] - bodies.seen[i, 0]
-        y = bodies.position[i, 1] - bodies.seen[i, 1]
-        z = bodies.position[i, 2] - bodies.seen[i, 2]
-        travel = max(travel, x * x + y * y + z * z)
-    bodies.seen[:] = bodies.position
-    # Sums of travels lose some of their last digits: a little more keeps the bound sure.
-    pairs.odometer[0] += 2 * math.sqrt(travel) * (1 + 1e-9)
-    now, gap, clear, reach = pairs.odometer[0], pairs.gap, pairs.clear, pairs.reach
-    for p in range(len(gap)):
-        if clear[p] - now > 2 * touch and reach[p] == 0.0:
-            gap[p] = clear[p] - now
-        else:
-            locate(bodies, pairs, p)
-            clear[p] = now + gap[p]
 
 
 @inlined

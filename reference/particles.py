@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from impactbench.reference.pairs import handled_pairs
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import UPRIGHT, Body, Box, Capsule, Contact, HalfSpace, Law, Model, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats
@@ -34,8 +33,8 @@ class Bodies(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """The handled pairs (documents, rule R2) with their coefficients and the memory of their contacts. Shapes [p] and
-    [p, 3].
+    """Handled pairs (documents, rule R2) that may touch soon, with their coefficients and the memory of their contacts.
+    Shapes [p] and [p, 3].
     """
 
     first: Indices
@@ -51,9 +50,13 @@ class Pairs(NamedTuple):
     """Whether the pair touched in the previous step: from then on it is a lasting contact."""
     reach: Floats
     """Gap [m] a reverted pair was put back to and at which it still counts as touching."""
+    slow: Floats
+    """Approach speed [m/s] that gravity along the normal alone explains, of the pairs that touch."""
     push: Floats
     """Normal impulse [N s] of the last step, the first guess of the next."""
     rub: Floats
+    parted: Floats
+    """How far [m] the last projection pushed the pair apart."""
     clear: Floats
     """Reading of the odometer up to which the pair surely is apart: two bodies close in by their own travel at most."""
     odometer: Floats
@@ -75,31 +78,6 @@ def build_bodies(scene: Scene) -> Bodies:
         size=np.array([_shape(b)[1] for b in bodies], dtype=np.float64).reshape(-1, 3),
         debt=np.zeros(len(bodies)),
         seen=np.array([b.position for b in bodies], dtype=np.float64).reshape(-1, 3),
-    )
-
-
-def build_pairs(scene: Scene) -> Pairs:
-    """Arrays of the pairs that can interact; two statics are never paired."""
-    handled = list(handled_pairs(scene.statics, scene.movable)) if scene.collide else []
-    contacts = [scene.contact_of(a, b) for a, b in handled]
-    for contact in {scene.contact, *contacts}:
-        check_contact(scene.name, contact)
-    count = len(handled)
-    return Pairs(
-        first=np.array([a for a, _ in handled], dtype=np.int64),
-        second=np.array([b for _, b in handled], dtype=np.int64),
-        bounciness=np.array([c.bounciness for c in contacts], dtype=np.float64),
-        friction=np.array([c.friction for c in contacts], dtype=np.float64),
-        viscosity=np.array([c.viscosity for c in contacts], dtype=np.float64),
-        gap=np.zeros(count),
-        normal=np.zeros((count, 3)),
-        touching=np.zeros(count, dtype=np.bool_),
-        touched=np.zeros(count, dtype=np.bool_),
-        reach=np.zeros(count),
-        push=np.zeros(count),
-        rub=np.zeros((count, 3)),
-        clear=np.zeros(count),
-        odometer=np.zeros(1),
     )
 
 

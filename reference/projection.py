@@ -13,8 +13,9 @@ import math
 
 import numpy as np
 from impactbench.reference.compiled import compiled, inlined
-from impactbench.reference.gaps import locate, look
+from impactbench.reference.nearby import Rooms, all_listed, look
 from impactbench.reference.particles import Bodies, Indices, Pairs
+from impactbench.reference.progress import Progress
 from impactbench.reference.pushes import Holds, hold_all
 from impactbench.reference.responses import exchange, reduced, relative
 from impactbench.scenarios.trajectory import Floats
@@ -24,54 +25,58 @@ TIMES = 20
 
 
 @compiled
-def project(bodies: Bodies, pairs: Pairs, gravity: Floats, touch: float, still: float) -> Floats:
+def project(
+    bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, gravity: Floats, touch: float, still: float
+) -> bool:
     """Move overlapping bodies apart until none is deeper than `touch`/2 [m], and let them pay. still [m/s]: none.
-    Returns how far [m] each pair was pushed apart.
+    `parted` says how far each pair was pushed apart. Returns False, to go on from there, if a new list is wanted.
 
     A heap that needs more than `TIMES` keeps its rest of overlap for the next step.
     """
-    moved, parted = False, np.zeros(len(pairs.gap))
-    for _ in range(TIMES):
-        look(bodies, pairs, touch)
-        deepest = 0.0
-        for p in range(len(pairs.gap)):
-            deepest = max(deepest, -pairs.gap[p])
+    while True:
+        if not all_listed(bodies.position, rooms, progress, touch):
+            return False
+        if progress.stage[1] == TIMES:
+            break
+        deepest = look(bodies, pairs, touch)
         if deepest <= touch / 2:
             break
-        moved = True
-        separate(bodies, pairs, np.nonzero(pairs.gap < 4 * deepest)[0], gravity, touch / 16, parted)
-    if moved:
+        if not all_listed(bodies.position, rooms, progress, 4 * deepest):
+            return False
+        look(bodies, pairs, 4 * deepest)
+        separate(bodies, pairs, np.nonzero(pairs.gap < 4 * deepest)[0], gravity, touch / 16)
+        progress.stage[1] += 1
+    if progress.stage[1] > 0:
         pay(bodies, pairs, np.nonzero(pairs.gap <= touch)[0], still)
-    return parted
+    progress.stage[1] = 0
+    return True
 
 
 @compiled
-def follow(bodies: Bodies, pairs: Pairs, speed: Floats) -> None:
-    """Velocities from positions (documents, rule R4): the speed [m/s] at which projection moved each pair apart, off
-    its approach.
+def follow(bodies: Bodies, pairs: Pairs, step: float) -> None:
+    """Velocities from positions (documents, rule R4): the speed at which projection moved each pair apart within `step`
+    [s], off its approach.
 
     Never more than the approach, so it takes energy and adds none; the impact that follows finds less to return.
     """
-    for p in range(len(speed)):
-        if speed[p] > 0:
+    for p in range(len(pairs.parted)):
+        if pairs.parted[p] > 0:
             n, approach = pairs.normal[p], max(0.0, -relative(bodies, pairs, p)[0])
-            blow = min(approach, speed[p]) * reduced(bodies, pairs, p)
+            blow = min(approach, pairs.parted[p] / step) * reduced(bodies, pairs, p)
             exchange(bodies, pairs, p, blow * n[0], blow * n[1], blow * n[2])
 
 
 @compiled
-def separate(bodies: Bodies, pairs: Pairs, near: Indices, gravity: Floats, tolerance: float, parted: Floats) -> None:
-    """The least displacements that leave no overlap among the pairs `near`; bodies note what theirs cost [J], and
-    `parted` how far [m] each pair was pushed apart.
+def separate(bodies: Bodies, pairs: Pairs, near: Indices, gravity: Floats, tolerance: float) -> None:
+    """The least displacements that leave no overlap among the pairs `near`, which were just looked at; bodies note what
+    theirs cost [J].
     """
-    for p in near:
-        locate(bodies, pairs, p)
     first, second = pairs.first[near], pairs.second[near]
     mass = 1 / (bodies.inverse_mass[first] + bodies.inverse_mass[second])
     holds = Holds(first, second, pairs.normal[near], np.zeros(len(near)), mass, pairs.gap[near])
     way = np.zeros_like(bodies.position)
     hold_all(way, bodies.inverse_mass, holds, tolerance)
-    parted[near] += holds.push / mass
+    pairs.parted[near] += holds.push / mass
     for i in range(len(way)):
         if bodies.inverse_mass[i] > 0:
             for k in range(3):

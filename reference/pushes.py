@@ -43,14 +43,13 @@ def hold_all(velocity: Floats, inverse_mass: Floats, holds: Holds, tolerance: fl
     Returns the last change.
     """
     first, second, normal, push, mass, ahead = holds
-    change = np.zeros_like(velocity)
     worst = 0.0
     for _ in range(ROUNDS):
         for turn in range(SWEEPS):
             worst = sweep(velocity, inverse_mass, first, second, normal, push, mass, ahead, turn % 2 == 0)
             if worst <= tolerance:
                 return worst
-        balance(velocity, inverse_mass, first, second, normal, push, mass, ahead, change, tolerance / 4)
+        balance(velocity, inverse_mass, first, second, normal, push, mass, ahead, tolerance / 4)
     return worst
 
 
@@ -90,14 +89,11 @@ def balance(
     push: Floats,
     mass: Floats,
     ahead: Floats,
-    change: Floats,
     tolerance: float,
 ) -> None:
-    """Conjugate gradients on the contacts that push. Ends where a push would turn into a pull: that contact lets go.
-
-    change: scratch like `velocity`; what a unit step along the search direction does to velocities.
-    """
-    free = push > 0.0
+    """Conjugate gradients on the contacts that push. Ends where a push would turn into a pull: that contact lets go."""
+    change = np.zeros_like(velocity)  # what a unit step along the search direction does to velocities
+    free, pushed = push > 0.0, bodies_of(first, second, len(velocity))
     lack, along = np.zeros(len(push)), np.zeros(len(push))
     size = 0.0
     for c in range(len(push)):
@@ -106,7 +102,8 @@ def balance(
             along[c] = mass[c] * lack[c]
             size += lack[c] * along[c]
     for _ in range(10 * len(push) + 20):
-        change[:] = 0.0
+        for i in pushed:
+            change[i, 0] = change[i, 1] = change[i, 2] = 0.0
         for c in range(len(push)):
             if free[c]:
                 give(change, inverse_mass, first[c], second[c], normal, c, along[c])
@@ -127,7 +124,7 @@ def balance(
                 lack[c] -= length * closing(change, first[c], second[c], normal, c)
                 worst = max(worst, abs(lack[c]))
                 size += lack[c] * mass[c] * lack[c]
-        for i in range(len(velocity)):
+        for i in pushed:
             for k in range(3):
                 velocity[i, k] += length * change[i, k]
         if length == most:
@@ -137,6 +134,15 @@ def balance(
             return
         for c in range(len(push)):
             along[c] = mass[c] * lack[c] + size / before * along[c]
+
+
+@compiled
+def bodies_of(first: Indices, second: Indices, count: int) -> Indices:
+    """Numbers of the bodies, of `count`, that are in any contact."""
+    held = np.zeros(count, dtype=np.bool_)
+    for c in range(len(first)):
+        held[first[c]] = held[second[c]] = True
+    return np.nonzero(held)[0]
 
 
 @inlined

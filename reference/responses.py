@@ -12,7 +12,6 @@ import numpy as np
 from impactbench.reference.compiled import compiled, inlined
 from impactbench.reference.particles import Bodies, Indices, Pairs
 from impactbench.reference.pushes import Holds, hold_all
-from impactbench.scenarios.trajectory import Floats
 
 BETWEEN = 25
 """Sweeps with friction from one solution of the pushes alone to the next."""
@@ -71,19 +70,19 @@ def strike(bodies: Bodies, pairs: Pairs, p: int, doc: bool) -> None:
 
 
 @compiled
-def resolve_impacts(bodies: Bodies, pairs: Pairs, active: Indices, slow: Floats, doc: bool, sweeps: int) -> None:
-    """Impacts of this instant, one pair after the other in sweeps, until none approaches faster than `slow` [m/s].
+def resolve_impacts(bodies: Bodies, pairs: Pairs, active: Indices, doc: bool, sweeps: int) -> None:
+    """Impacts of this instant, one pair after the other in sweeps, until none approaches faster than `slow`.
 
     A lasting contact that was already closing fast stays lasting; one set closing by an impact of this instant is an
     impact too, which hands a blow on through a row of balls. What still closes after `sweeps` (a train of ever weaker
     blows) is left to `hold`.
     """
     for p in active:
-        pairs.touching[p] = not (pairs.touched[p] and relative(bodies, pairs, p)[0] < -slow[p])
+        pairs.touching[p] = not (pairs.touched[p] and relative(bodies, pairs, p)[0] < -pairs.slow[p])
     for _ in range(sweeps):
         struck = False
         for p in active:
-            if pairs.touching[p] and relative(bodies, pairs, p)[0] < -slow[p]:
+            if pairs.touching[p] and relative(bodies, pairs, p)[0] < -pairs.slow[p]:
                 strike(bodies, pairs, p, doc)
                 struck = True
         if not struck:
@@ -101,6 +100,8 @@ def hold(bodies: Bodies, pairs: Pairs, active: Indices, rubbing: bool, tolerance
     changes a velocity by more than `tolerance` [m/s], or after `sweeps`; returns the last change [m/s]. `pushes` solves
     the normal part of tall columns and unlike masses first and every `BETWEEN` sweeps; without friction, that is all.
     """
+    if len(active) == 0:
+        return 0.0
     for p in active:
         n, push = pairs.normal[p], pairs.push[p]
         exchange(bodies, pairs, p, push * n[0], push * n[1], push * n[2])

@@ -16,8 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from impactbench.reference.compiled import compiled
-from impactbench.reference.gaps import locate, look
+from impactbench.reference.gaps import locate
+from impactbench.reference.nearby import Rooms, all_listed, look, squared_way
 from impactbench.reference.particles import Bodies, Indices, Pairs
+from impactbench.reference.progress import BEGIN, MOVED, Progress
 from impactbench.reference.projection import follow, project
 from impactbench.reference.responses import damp, hold, relative, resolve_impacts
 from impactbench.scenarios.trajectory import Floats
@@ -45,17 +47,30 @@ class Rules(NamedTuple):
 
 
 @compiled
-def run(bodies: Bodies, pairs: Pairs, rules: Rules, steps: int) -> int:
-    """Advance by `steps`. Returns how many were done: fewer if lasting contacts found no common solution in
-    `SWEEPS`.
+def run(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules: Rules, steps: int) -> int:
+    """Advance by `steps`. Returns how many were done: fewer where contacts found no common solution in `SWEEPS`, or
+    where a new list of pairs is wanted, as `progress` says.
     """
     for done in range(steps):
-        if not one_step(bodies, pairs, rules):
+        if progress.stage[0] == BEGIN:
+            meet_and_move(bodies, pairs, progress, rules)
+            progress.stage[0] = MOVED
+        if rules.revert:
+            apart = revert(bodies, pairs, rooms, progress, rules)
+        else:
+            apart = project(bodies, pairs, rooms, progress, rules.gravity, rules.touch, rules.still)
+        if not apart:
+            return done
+        if rules.positions:
+            follow(bodies, pairs, rules.step)
+        progress.stage[0] = BEGIN
+        # What is left after all sweeps is harmless below the speed that a contact may have anyway: the next step goes
+        # on from there.
+        if progress.rest[0] > max(rules.still, 2 * rules.step * math.sqrt((rules.gravity**2).sum())):
             return done
     return steps
 
 
-@compiled
 def start(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
     """Contacts that touch at t = 0 are lasting ones (documents, rule R3)."""
     detect(bodies, pairs, rules.touch)
@@ -63,12 +78,13 @@ def start(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
 
 
 @compiled
-def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
+def meet_and_move(bodies: Bodies, pairs: Pairs, progress: Progress, rules: Rules) -> None:
+    """All of a step but what keeps bodies apart."""
     active = detect(bodies, pairs, rules.touch)
-    slow = slow_approach(pairs, active, rules)
+    slow_approach(pairs, active, rules)
     for p in active:
-        pairs.touched[p] |= relative(bodies, pairs, p)[0] >= -slow[p]
-    resolve_impacts(bodies, pairs, active, slow, rules.doc, IMPACT_SWEEPS)
+        pairs.touched[p] |= relative(bodies, pairs, p)[0] >= -pairs.slow[p]
+    resolve_impacts(bodies, pairs, active, rules.doc, IMPACT_SWEEPS)
 
     # Lasting contacts carry no approach into the step; what they pushed here is no part of the step's weight.
     weight = pairs.push.copy()
@@ -78,26 +94,19 @@ def one_step(bodies: Bodies, pairs: Pairs, rules: Rules) -> bool:
     lasting = active[parting(bodies, pairs, active) <= 1e3 * rules.still]
     pairs.push[:] = 0.0
     pairs.push[lasting] = weight[lasting]
-    before, last = bodies.velocity.copy(), bodies.position.copy()
+    before = progress.before
+    before[:], progress.last[:] = bodies.velocity, bodies.position
     for i in range(len(bodies.inverse_mass)):
         if bodies.inverse_mass[i] > 0:
             bodies.velocity[i] += rules.step * rules.gravity
-    rest = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
+    progress.rest[0] = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
     if rules.doc:
         damp(bodies, pairs, lasting, rules.step, rules.still)
 
     bodies.velocity[:] *= rules.carried
     bodies.position[:] += rules.step / 2 * (before + bodies.velocity) * rules.carried
     pairs.touched[:] = pairs.touching
-    if rules.revert:
-        revert(bodies, pairs, rules, last, before, slow)
-    else:
-        parted = project(bodies, pairs, rules.gravity, rules.touch, rules.still)
-        if rules.positions:
-            follow(bodies, pairs, parted / rules.step)
-    # What is left after all sweeps is harmless below the speed that a contact may have anyway: the next step goes on
-    # from there.
-    return rest <= max(rules.still, 2 * rules.step * math.sqrt((rules.gravity**2).sum()))
+    pairs.parted[:] = 0.0
 
 
 @compiled
@@ -112,13 +121,12 @@ def detect(bodies: Bodies, pairs: Pairs, touch: float) -> Indices:
 
 
 @compiled
-def slow_approach(pairs: Pairs, active: Indices, rules: Rules) -> Floats:
+def slow_approach(pairs: Pairs, active: Indices, rules: Rules) -> None:
     """Approach speed [m/s] per pair that gravity along its normal alone explains, 2 h |g . n|."""
-    slow = np.zeros(len(pairs.first))
+    pairs.slow[:] = 0.0
     for p in active:
         n, g = pairs.normal[p], rules.gravity
-        slow[p] = max(rules.still, 2 * rules.step * abs(g[0] * n[0] + g[1] * n[1] + g[2] * n[2]))
-    return slow
+        pairs.slow[p] = max(rules.still, 2 * rules.step * abs(g[0] * n[0] + g[1] * n[1] + g[2] * n[2]))
 
 
 @compiled
@@ -131,13 +139,19 @@ def parting(bodies: Bodies, pairs: Pairs, active: Indices) -> Floats:
 
 
 @compiled
-def revert(bodies: Bodies, pairs: Pairs, rules: Rules, last: Floats, before: Floats, slow: Floats) -> None:
+def revert(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules: Rules) -> bool:
     """Put overlapping bodies back to where the step began, with the velocity they had there (documents, rule R4).
 
     A body put back may now be in another's way, which goes back as well; at most every body does. Pairs that
     overlapped count as touching across the gap that is left, so that the next step treats their contact; after that
-    only across a gap of 2 g h^2, so that a body held further off falls on.
+    only across a gap of 2 g h^2, so that a body held further off falls on. Returns False, having done nothing, if
+    a new list of pairs is wanted.
     """
+    last, before, furthest = progress.last, progress.before, 0.0
+    for i in range(len(last)):
+        furthest = max(furthest, squared_way(bodies.position, last, i))
+    if not all_listed(bodies.position, rooms, progress, rules.touch + 2 * math.sqrt(furthest) * (1 + 1e-9)):
+        return False
     back = np.zeros(len(bodies.inverse_mass), dtype=np.bool_)
     met = np.zeros(len(pairs.first), dtype=np.bool_)
     for _ in range(len(back) + 1):
@@ -155,7 +169,8 @@ def revert(bodies: Bodies, pairs: Pairs, rules: Rules, last: Floats, before: Flo
         if clear:
             break
     for p in range(len(met)):
-        pairs.reach[p] = min(pairs.reach[p], rules.step * slow[p])
+        pairs.reach[p] = min(pairs.reach[p], rules.step * pairs.slow[p])
         if met[p]:
             locate(bodies, pairs, p)
             pairs.reach[p] = max(0.0, pairs.gap[p])
+    return True

@@ -20,6 +20,8 @@ Dim = tuple[float, ...]
 Numbers = NDArray[np.uint32]
 Starts = NDArray[np.int32]
 
+BLOCK = 4096
+"""Pairs looked at together: they and their bodies stay in the cache meanwhile."""
 LEVEL_RATIO, LEVELS = 4.0, 8
 """Spheres within this ratio of radii share a grid; the last of the grids takes all that are smaller still."""
 TOUCH, STILL = 1e-10, 1e-13
@@ -69,13 +71,15 @@ class Level(NamedTuple):
 
 class Lists(NamedTuple):
     """Flat lists of two unsigned numbers an entry. pairs: candidates (rows of `Order`), complete until a body has moved
-    by half the skin; near: those that are close now; sides, near_sides: the same for (body, static).
+    by half the skin; near: those that are close now; sides, near_sides: the same for (body, static). until: for each
+    `BLOCK` of candidates, how many rows of `Order` hold the bodies of all up to there.
     """
 
     pairs: Numbers
     near: Numbers
     sides: Numbers
     near_sides: Numbers
+    until: Numbers
 
 
 class Swarm(NamedTuple):
@@ -136,7 +140,8 @@ def from_arrays(
 
 def make_lists(pairs: int, sides: int) -> Lists:
     """Room for so many pairs and sides."""
-    return Lists(*(np.zeros(2 * size, dtype=np.uint32) for size in (pairs, pairs, sides, sides)))
+    sizes = 2 * pairs, 2 * pairs, 2 * sides, 2 * sides, pairs // BLOCK + 1
+    return Lists(*(np.zeros(size, dtype=np.uint32) for size in sizes))
 
 
 def _grid(radius: Floats) -> Grid:

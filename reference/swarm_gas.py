@@ -17,6 +17,7 @@ import numpy as np
 from impactbench.reference.compiled import compiled
 from impactbench.reference.particles import Indices
 from impactbench.reference.swarm import (
+    BLOCK,
     BUILDS,
     FASTEST,
     IMPACTS,
@@ -46,7 +47,7 @@ def run(swarm: Swarm, steps: int) -> int:
     dim, count, gauge, step, touch = swarm.dim, swarm.tally, swarm.gauge, swarm.step, swarm.touch
     place, velocity, mass, origin = swarm.now.place, swarm.now.velocity, swarm.now.inverse_mass, swarm.built.place
     pairs, near, sides, near_sides = swarm.lists.pairs, swarm.lists.near, swarm.lists.sides, swarm.lists.near_sides
-    kind, where, size = swarm.statics.kind, swarm.statics.place, swarm.statics.size
+    kind, where, size, until = swarm.statics.kind, swarm.statics.place, swarm.statics.size, swarm.lists.until
     for done in range(steps):
         for _ in range(SWEEPS):
             struck = strike_sides(dim, place, velocity, kind, where, size, near_sides, count, touch, swarm.still)
@@ -59,11 +60,9 @@ def run(swarm: Swarm, steps: int) -> int:
                 return done
             gauge[TRAVEL] = 0.0
             count[BUILDS] += 1
-        for k in range(len(place)):
-            place[k] += step * velocity[k]
         gauge[TRAVEL] += step * gauge[FASTEST]
         margin = touch + MARGIN * step * gauge[FASTEST]
-        detect(dim, place, pairs, near, count, margin)
+        move_and_detect(dim, place, velocity, step, pairs, until, near, count, margin)
         detect_sides(dim, place, kind, where, size, sides, near_sides, count, margin)
         for sweep in range(SWEEPS):
             moved = lift_sides(dim, place, velocity, origin, kind, where, size, near_sides, count, gauge, touch, sweep)
@@ -82,18 +81,53 @@ def start(swarm: Swarm) -> bool:
     swarm.tally[BUILDS] += 1
     margin = swarm.touch + MARGIN * swarm.step * swarm.gauge[FASTEST]
     lists, statics, place = swarm.lists, swarm.statics, swarm.now.place
-    detect(swarm.dim, place, lists.pairs, lists.near, swarm.tally, margin)
+    swarm.tally[NEAR] = list_near(swarm.dim, place, lists.pairs, 0, swarm.tally[PAIRS], lists.near, 0, margin)
+    swarm.tally[LOOKED] += swarm.tally[PAIRS]
     kind, where, size = statics.kind, statics.place, statics.size
     detect_sides(swarm.dim, place, kind, where, size, lists.sides, lists.near_sides, swarm.tally, margin)
     return True
 
 
 @compiled
-def detect(dim: Dim, place: Floats, pairs: Numbers, near: Numbers, count: Indices, margin: float) -> None:
-    """List the pairs that are near now. Without a branch: a pair is always written, and counted where it is one."""
+def move_and_detect(
+    dim: Dim,
+    place: Floats,
+    velocity: Floats,
+    step: float,
+    pairs: Numbers,
+    until: Numbers,
+    near: Numbers,
+    count: Indices,
+    margin: float,
+) -> None:
+    """Move all bodies and list the pairs that are near then.
+
+    Pairs come in the order of their first bodies, and their second ones are not far: bodies are moved just before the
+    `BLOCK` of pairs that needs them, so that of a crowd larger than the cache each is fetched once, not twice.
+    """
+    moved, found = np.int64(0), 0
+    for begin in range(0, count[PAIRS], BLOCK):
+        needed = np.int64(until[begin // BLOCK]) * (len(dim) + 1)
+        for k in range(moved, needed):
+            place[k] += step * velocity[k]
+        moved = needed
+        found = list_near(dim, place, pairs, begin, min(begin + BLOCK, count[PAIRS]), near, found, margin)
+    for k in range(moved, len(place)):
+        place[k] += step * velocity[k]
+    count[NEAR] = found
+    count[LOOKED] += count[PAIRS]
+
+
+@compiled
+def list_near(
+    dim: Dim, place: Floats, pairs: Numbers, begin: int, end: int, near: Numbers, count: int, margin: float
+) -> int:
+    """Add the pairs `begin` to `end` that are near to the `count` in `near`; returns how many there are now. Without a
+    branch: a pair is always written, and counted where it is one.
+    """
     d = len(dim)
-    stride, last, found, one = np.uint64(d + 1), np.uint64(d), np.uint64(0), np.uint64(1)
-    for p in range(np.uint64(count[PAIRS])):
+    stride, last, found, one = np.uint64(d + 1), np.uint64(d), np.uint64(2 * count), np.uint64(1)
+    for p in range(np.uint64(begin), np.uint64(end)):
         i, j = pairs[np.uint64(2) * np.uint64(p)], pairs[np.uint64(2) * np.uint64(p) + one]
         a, b = np.uint64(i) * stride, np.uint64(j) * stride
         square = 0.0
@@ -103,8 +137,7 @@ def detect(dim: Dim, place: Floats, pairs: Numbers, near: Numbers, count: Indice
         reach = place[a + last] + place[b + last] + margin
         near[found], near[found + one] = i, j
         found += np.uint64(2) * np.uint64(square < reach * reach)
-    count[NEAR] = np.int64(found) // 2
-    count[LOOKED] += count[PAIRS]
+    return int(found) // 2
 
 
 @compiled

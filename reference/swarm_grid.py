@@ -14,6 +14,7 @@ import numpy as np
 from impactbench.reference.compiled import compiled
 from impactbench.reference.particles import Indices
 from impactbench.reference.swarm import (
+    BLOCK,
     FASTEST,
     NEAR,
     NEAR_SIDES,
@@ -51,7 +52,19 @@ def build(swarm: Swarm) -> bool:
     sides = list_sides(dim, place, swarm.statics, skin, grid.radius[0], lists.sides)
     swarm.tally[PAIRS], swarm.tally[SIDES] = pairs, sides
     swarm.tally[NEAR] = swarm.tally[NEAR_SIDES] = 0
-    return 2 * pairs < len(lists.pairs) and 2 * sides <= len(lists.sides)
+    if 2 * pairs >= len(lists.pairs) or 2 * sides > len(lists.sides):
+        return False
+    note_blocks(lists.pairs, pairs, lists.until)
+    return True
+
+
+@compiled
+def note_blocks(pairs: Numbers, count: int, until: Numbers) -> None:
+    """How many bodies, in their order, hold those of each `BLOCK` of pairs and of the blocks before."""
+    furthest = np.uint32(0)
+    for p in range(count):
+        furthest = max(furthest, pairs[2 * p], pairs[2 * p + 1])
+        until[p // BLOCK] = furthest + 1
 
 
 @compiled

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
+from impactbench.reference.compiled import compiled
 from impactbench.reference.impact import Velocities, apply_impulse, reduced_mass, split
-from impactbench.reference.particles import Bodies, Pairs
 from impactbench.scenarios.trajectory import Floats
 
 
@@ -37,16 +37,14 @@ def damping_step(tangential: Floats, rate: float, step: float) -> Floats:
     return tangential * math.exp(-rate * step)
 
 
-def force_as_damping(scene: str, bodies: Bodies, pairs: Pairs, step: float) -> None:
-    """Replace every c by the one whose damping over `step` is the explicit force's: exp(-c' h/mu_r) = 1 - c h/mu_r.
-
-    Raises ValueError where c h/mu_r > 1 (see `force_step`).
+@compiled
+def as_damping(viscosity: float, ratio: float) -> float:
+    """The c' [kg/s] whose damping over a step is the explicit force of c: exp(-c' h/mu_r) = 1 - ratio, ratio =
+    c h/mu_r from 0 to 1.
     """
-    for p, c in enumerate(pairs.viscosity):
-        ratio = c * step * (bodies.inverse_mass[pairs.first[p]] + bodies.inverse_mass[pairs.second[p]])
-        if ratio > 1:
-            raise ValueError(f"{scene}: c h/m = {ratio:.3g} > 1: as a force, viscosity {c:g} would reverse the sliding")
-        pairs.viscosity[p] = math.inf if ratio == 1 else -math.log1p(-ratio) * c / ratio if ratio > 0 else 0.0
+    if ratio >= 1:
+        return math.inf
+    return -math.log1p(-ratio) * viscosity / ratio
 
 
 def distance(speed: float, rate: float, time: float) -> float:

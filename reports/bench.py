@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from impactbench.reports.bench_heap import heap
 from impactbench.reports.bench_lane import lane
 from impactbench.reports.bench_model import smallest, statics
 from impactbench.reports.bench_race import OURS, Race, run_race
@@ -90,12 +91,14 @@ def growth(quick: bool) -> Part:
             {
                 "bodies": count,
                 "ns per body and step": sorted(costs[count])[len(costs[count]) // 2],
+                "least": min(costs[count]),
                 "bytes per body": engine.figures()["bytes"] / count,
                 "build [s]": seconds,
             }
         )
-    reference = next(row["ns per body and step"] for row in rows if row["bodies"] == 1000)
-    return {"rows": rows, "growth from 1e3 to the largest": rows[-1]["ns per body and step"] / reference}
+    reference = next(row for row in rows if row["bodies"] == 1000)
+    ratios = {key: rows[-1][key] / reference[key] for key in ("ns per body and step", "least")}
+    return {"rows": rows, **{f"growth from 1e3 to the largest, {key}": ratio for key, ratio in ratios.items()}}
 
 
 def pairs(quick: bool) -> Part:
@@ -109,7 +112,7 @@ def startup(quick: bool) -> Part:
     """Start of a process and first step: kernels compiled anew (once per version), and loaded from disk."""
     code = (
         "import time; a = time.perf_counter(); from impactbench.reference.warm_up import warm_up; "
-        "b = time.perf_counter(); warm_up(); print(b - a, time.perf_counter() - b)"
+        "b = time.perf_counter(); warm_up(); print(b - a, time.perf_counter() - b, time.process_time())"
     )
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -118,8 +121,10 @@ def startup(quick: bool) -> Part:
             done = subprocess.run(
                 [sys.executable, "-c", code], env={**os.environ, **own}, capture_output=True, text=True, check=True
             )
-            imports, kernels = map(float, done.stdout.split())
-            rows.append({"kernels": name, "imports [s]": imports, "all kernels once [s]": kernels})
+            imports, kernels, processor = map(float, done.stdout.split())
+            rows.append(
+                {"kernels": name, "imports [s]": imports, "run once [s]": kernels, "processor time [s]": processor}
+            )
     return {"rows": rows}
 
 
@@ -131,6 +136,7 @@ BENCHMARKS: dict[str, Callable[[bool], Part]] = {
     "pairs": pairs,
     "exact": exact,
     "growth": growth,
+    "heap": heap,
     "startup": startup,
     "lane": lane,
     "smallest": smallest,

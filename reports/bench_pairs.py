@@ -8,10 +8,12 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from impactbench.reference.coefficients import build_coefficients
 from impactbench.reference.contestant import Stepped
 from impactbench.reference.gaps import locate_all
+from impactbench.reference.nearby import all_pairs
 from impactbench.reference.pairs import pair_counts
-from impactbench.reference.particles import Bodies, Pairs, build_bodies, build_pairs
+from impactbench.reference.particles import Bodies, Pairs, build_bodies
 from impactbench.scenarios import crowds
 from impactbench.scenarios.records import Scene
 
@@ -22,8 +24,9 @@ def count_pairs(count: int, rounds: int) -> dict[str, Any]:
     """Counts for `count` spheres, half of them static; times in alternation, the shortest of all rounds."""
     scene = _spheres(crowds.gas(count, statics=count // 2))
     static, one_way, two_way = pair_counts(count // 2, count - count // 2)
-    bodies, handled = build_bodies(scene), build_pairs(scene)
-    everything = _all_pairs(handled, count)
+    bodies = build_bodies(scene)
+    handled = all_pairs(scene, bodies, build_coefficients(scene))
+    everything = _static_too(handled, count)
     ours, free, saved = _time_looks(bodies, handled, everything, rounds)
     mixed, moving = (_candidates(crowds.gas(count, statics=n)) for n in (count // 2, 0))
     share = static / (static + one_way + two_way)
@@ -45,7 +48,7 @@ def _spheres(scene: Scene) -> Scene:
     return replace(scene, bodies=tuple(body for body in scene.bodies if body.name.startswith("ball")))
 
 
-def _all_pairs(handled: Pairs, count: int) -> Pairs:
+def _static_too(handled: Pairs, count: int) -> Pairs:
     """What the list would be if static pairs were looked at too."""
     first, second = np.array(list(combinations(range(count), 2)), dtype=np.int64).T.copy()
     return handled._replace(first=first, second=second, gap=np.zeros(len(first)), normal=np.zeros((len(first), 3)))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from impactbench.adapters.contestants import Contestant
 from impactbench.adapters.isolation import Job, run_jobs
 from impactbench.reports import contract
+from impactbench.reports.executors import WARM_UPS
 from impactbench.reports.trial import Broken, NotBuilt
 from impactbench.scenarios.engine import Unavailable
 
@@ -38,7 +39,7 @@ class Verdict:
 def conform(contestants: Sequence[Contestant], workers: int = 1) -> dict[str, list[Verdict]]:
     """Verdicts by contestant, in the order of `POINTS`."""
     if any(contestant.lane == "reference" for contestant in contestants):
-        list(run_jobs([Job("compile", "reference", "impactbench.reference.contestant:warm_up", None, 600.0)], 1))
+        list(run_jobs(WARM_UPS, workers))
     found: dict[str, dict[str, Verdict]] = {contestant.name: {} for contestant in contestants}
     jobs = [
         Job(f"{contestant.name} {point}", contestant.lane, f"{__name__}:try_point", (point, contestant), LIMIT)

@@ -6,6 +6,7 @@ They are for speed and for limits; the catalogue has no truth for them beyond wh
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -43,6 +44,32 @@ def gas(count: int, dimension: int = 3, fill: float = 0.1, seed: int = 1, static
         length=2 * RADIUS,
         speed=1.0,
         energy=0.5 * dimension * count,
+    )
+
+
+def heap(count: int, fill: float = 0.3, seed: int = 1) -> Scene:
+    """`count` balls of 1 kg that fall into a square pit, as high as it is wide, filled by the share `fill`.
+
+    They start on a jittered lattice with normally distributed velocities of 1 m/s along each axis.
+    """
+    rng = np.random.default_rng(seed)
+    places, side = lattice(count, 3, fill, rng)
+    velocities = rng.normal(size=(count, 3))
+    bodies = [
+        Body(f"ball {i}", Sphere(RADIUS), 1.0, _vector(x), _vector(v))
+        for i, (x, v) in enumerate(zip(places.tolist(), velocities.tolist(), strict=True))
+    ]
+    pit = [replace(w, name="floor") if w.name == "wall 2-" else w for w in cube(side, 3) if w.name != "wall 2+"]
+    return Scene(
+        name=f"heap[bodies={count},fill={fill:g},seed={seed}]",
+        bodies=(*bodies, *pit),
+        duration=2.0,
+        model=Model((0, 1, 2), gravity=True, friction=True),
+        length=2 * RADIUS,
+        speed=math.sqrt(9.81 * side),
+        energy=count * 9.81 * side / 2,
+        gravity=(0.0, 0.0, -9.81),
+        contact=Contact(bounciness=0.5, friction=0.3, viscosity=0.5),
     )
 
 
