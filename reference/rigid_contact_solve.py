@@ -44,7 +44,7 @@ def hold(
                     worst = max(worst, grip(solids, velocity, spin, touches, c))
             if worst <= tolerance:
                 return worst
-        balance(solids, velocity, spin, touches, closing, rubbing, tolerance / 4)
+        balance(solids, velocity, spin, touches, closing, rubbing, tolerance / 32)
     return worst
 
 

@@ -25,8 +25,8 @@ class Way(NamedTuple):
     solids: Solids
     couples: Couples
     touches: Touches
-    before: Memory
-    """Forces of the time before: the first guess."""
+    forces: Memory
+    """Of the contacts, all the way: the first guess for parts of it."""
     start: Poses
     found: Features
 
@@ -35,12 +35,12 @@ class Way(NamedTuple):
 def gap_after(way: Way, steps: Steps, time: float) -> tuple[float, Memory]:
     """Go the way of `time` [s]; returns the least gap [m] of what did not touch at its beginning, and the forces."""
     put_back(way.solids, way.start)
-    after, _ = move(way.solids, way.touches, way.before, steps, time)
+    after, _ = move(way.solids, way.touches, way.forces, steps, time)
     return least_gap(way.solids, way.couples, after, way.found), after
 
 
 @compiled
-def impact_time(way: Way, steps: Steps, left: float, after: Memory, width: float) -> tuple[float, Memory]:
+def impact_time(way: Way, steps: Steps, left: float, width: float) -> tuple[float, Memory]:
     """The first time in (0, left] at which a feature that did not touch does; leaves the bodies there, with the forces
     until then. `left` if there is none: the bodies stay, gone all the way.
 
@@ -48,9 +48,9 @@ def impact_time(way: Way, steps: Steps, left: float, after: Memory, width: float
     falsi.
     """
     samples = samples_of(way.solids, left, width)
-    gap = least_gap(way.solids, way.couples, after, way.found)
+    gap = least_gap(way.solids, way.couples, way.forces, way.found)
     if samples == 1 and not gap < -steps.touch / 2:
-        return left, after
+        return left, way.forces
     end, before, above = poses(way.solids), 0.0, math.inf
     for sample in range(1, samples + 1):
         time = left * sample / samples
@@ -59,11 +59,11 @@ def impact_time(way: Way, steps: Steps, left: float, after: Memory, width: float
         if gap < -steps.touch / 2:
             if above == math.inf:
                 put_back(way.solids, way.start)
-                above = max(least_gap(way.solids, way.couples, after, way.found), steps.touch)
+                above = max(least_gap(way.solids, way.couples, way.forces, way.found), steps.touch)
             return root(way, steps, before, above, time, gap)
         before, above = time, gap
     put_back(way.solids, end)
-    return left, after
+    return left, way.forces
 
 
 @compiled
@@ -71,7 +71,7 @@ def root(way: Way, steps: Steps, low: float, above: float, high: float, below: f
     """Time [s] at which the least gap is within a touch of 0, by Illinois' false position; `above` and `below` are the
     gaps at `low` and `high`.
     """
-    last, time, after = 0.0, high, way.before
+    last, time, after = 0.0, high, way.forces
     for _ in range(SEARCH):
         time = high - below * (high - low) / (below - above)
         if not low < time < high:

@@ -66,14 +66,16 @@ def put_back(solids: Solids, state: Poses) -> None:
 
 
 @compiled
-def move(solids: Solids, touches: Touches, memory: Memory, steps: Steps, time: float) -> tuple[Memory, float]:
-    """Gravity, lasting contacts with friction, and the way of `time` [s]. Returns the contacts' forces for the next
-    time, and what change of velocity [m/s] they still found at last.
+def move(solids: Solids, touches: Touches, guess: Memory, steps: Steps, time: float) -> tuple[Memory, float]:
+    """Gravity, lasting contacts with friction, and the way of `time` [s]. `guess` at the contacts' forces; returns what
+    they were, and what change of velocity [m/s] they still found at last.
     """
     velocity, spin = solids.velocity, solids.spin
     before, spun = velocity.copy(), spin.copy()
     speed = np.array([parting(velocity, spin, touches, c) for c in range(len(touches.key))])
-    recall(touches, memory, time)
+    for c in range(len(touches.key)):
+        touches.push[c] = time * guess.push[c]
+        put(touches.rub, c, scale(time, row(guess.rub, c)))
     for i in range(len(solids.lightness)):
         if solids.lightness[i] > 0:
             velocity[i] += time * steps.gravity
@@ -82,7 +84,10 @@ def move(solids: Solids, touches: Touches, memory: Memory, steps: Steps, time: f
             if touches.viscosity[c] > 0 and speed[c] <= 1e3 * steps.still:
                 damp(solids, touches, c, time)
     # No overlap at the end of the way: a contact in flight may come back as fast as it left, and no push gains.
-    closing = np.maximum(0.0, 2 * np.maximum(0.0, touches.gap - ROUND * steps.touch) / time + speed)
+    closing = np.zeros(len(speed))
+    for c in range(len(speed)):
+        flight = speed[c] if abs(speed[c]) > 1e3 * steps.still else 0.0
+        closing[c] = max(0.0, 2 * max(0.0, touches.gap[c] - ROUND * steps.touch) / time + flight)
     rest = hold(solids, velocity, spin, touches, closing, not steps.doc, steps.still)
     velocity *= steps.carried
     spin *= steps.turning
@@ -96,13 +101,16 @@ def move(solids: Solids, touches: Touches, memory: Memory, steps: Steps, time: f
 
 
 @compiled
-def recall(touches: Touches, memory: Memory, time: float) -> None:
-    """The first guess: what contacts pushed and rubbed the last time, for `time` [s]; rubs in today's plane."""
-    for c in range(len(touches.key)):
-        at, n = touches.known[c], row(touches.normal, c)
-        rub = row(memory.rub, at) if at >= 0 else (0.0, 0.0, 0.0)
-        touches.push[c] = time * memory.push[at] if at >= 0 else 0.0
-        put(touches.rub, c, scale(time, plus(rub, -dot(rub, n), n)))
+def recalled(touches: Touches, memory: Memory) -> Memory:
+    """What these contacts pushed and rubbed the last time, 0 if there was none; rubs in today's plane."""
+    count = len(touches.key)
+    push, rub = np.zeros(count), np.zeros((count, 3))
+    for c in range(count):
+        if touches.known[c] >= 0:
+            n, last = row(touches.normal, c), row(memory.rub, touches.known[c])
+            push[c] = memory.push[touches.known[c]]
+            put(rub, c, plus(last, -dot(last, n), n))
+    return Memory(touches.key, push, rub)
 
 
 @inlined

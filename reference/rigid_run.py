@@ -25,7 +25,7 @@ from impactbench.reference.rigid_checks import check_rigid
 from impactbench.reference.rigid_contact_solve import ROUNDS, SWEEPS, hold
 from impactbench.reference.rigid_instant import Way, impact_time
 from impactbench.reference.rigid_lift import lift_all as _lift
-from impactbench.reference.rigid_motion import ROUND, Steps, move, poses
+from impactbench.reference.rigid_motion import ROUND, Steps, move, poses, recalled
 from impactbench.reference.rigid_strike import approaching, strike_all
 from impactbench.reference.rigid_touches import Couples, Memory, Touches, least_gap, look_around, margin_of, touches_now
 from impactbench.reference.solids import SPACE, Solids, build_solids
@@ -174,12 +174,12 @@ def run(
         closing = np.maximum(0.0, touches.gap - ROUND * steps.touch) / left
         hold(solids, solids.velocity, solids.spin, touches, closing, False, steps.still)
         start = poses(solids)
-        after, rest = move(solids, touches, memory, steps, left)
+        after, rest = move(solids, touches, recalled(touches, memory), steps, left)
         if rest > enough:
             return UNSETTLED, touches, memory
         if counts[1] < IMPACTS:
-            way = Way(solids, couples, touches, memory, start, found)
-            time, after = impact_time(way, steps, left, after, width)
+            way = Way(solids, couples, touches, after, start, found)
+            time, after = impact_time(way, steps, left, width)
             if time < left:
                 memory, clock.left[0] = after, left - time
                 counts[1] += 1
