@@ -103,10 +103,8 @@ def to_edge(half: Vector, axis: int, side: int, start: Vector, along: Vector) ->
     """
     first, second = 1.0 if side % 2 else -1.0, 1.0 if side // 2 else -1.0
     x = half[0] * (-1.0 if axis == 0 else first)
-    y = half[1] * (-1.0 if axis == 1 else (first if axis == 2 else second))
+    y = half[1] * (-1.0 if axis == 1 else (first if axis == 0 else second))
     z = half[2] * (-1.0 if axis == 2 else second)
-    if axis == 0:
-        y, z = half[1] * first, half[2] * second
     way = scale(2 * half[axis], unit(axis))
     s, t = nearest(start, along, (x, y, z), way)
     foot = plus((x, y, z), t, way)

@@ -38,8 +38,9 @@ def balance(
     for c in range(count):
         limit, rub = WITHIN * touches.friction[c] * touches.push[c], row(touches.rub, c)
         holds[c] = rubbing and pushes[c] and dot(rub, rub) < limit * limit
-    for _ in range(2 * count):
-        c = descend(solids, velocity, spin, touches, closing, pushes, holds, tolerance)
+    left = 10 * count + 20
+    while left > 0:
+        c, left = descend(solids, velocity, spin, touches, closing, pushes, holds, tolerance, left)
         if c < 0:
             return
         if holds[c] and touches.push[c] > 0:
@@ -58,9 +59,10 @@ def descend(
     pushes: Flags,
     holds: Flags,
     tolerance: float,
-) -> int:
-    """Conjugate gradients; returns the contact that stops them, whose push has become 0 or whose rub is on its cone, or
-    -1 if none does.
+    ways: int,
+) -> tuple[int, int]:
+    """Conjugate gradients along at most so many ways; returns the contact that stops them, whose push has become 0 or
+    whose rub is on its cone, or -1 if none does, and how many ways are left.
     """
     count = len(touches.push)
     lack, along = np.zeros((count, 3)), np.zeros((count, 3))
@@ -72,7 +74,7 @@ def descend(
             put(lack, c, scale(-1.0, heeded(touches, c, u, holds[c])))
             put(along, c, weighed(touches, c, row(lack, c)))
             size += dot(row(lack, c), row(along, c))
-    for _ in range(10 * count + 20):
+    for left in range(ways - 1, -1, -1):
         change[:] = 0.0
         turn[:] = 0.0
         for c in range(count):
@@ -87,7 +89,7 @@ def descend(
                     most, stop = room, c
         # Where contacts repeat one another (two corners of a box on a floor, and friction), some ways push nothing.
         if not slope > 0.0:
-            return -1
+            return -1, left
         step, held = min(size / slope, most), touches.push[stop]
         velocity += step * change
         spin += step * turn
@@ -95,14 +97,14 @@ def descend(
         if step == most:
             if touches.push[stop] <= 1e-12 * held:
                 touches.push[stop] = 0.0
-            return stop
+            return stop, left
         if worst <= tolerance:
-            return -1
+            return -1, left
         for c in range(count):
             size += dot(row(lack, c), weighed(touches, c, row(lack, c)))
         for c in range(count):
             put(along, c, plus(weighed(touches, c, row(lack, c)), size / before, row(along, c)))
-    return -1
+    return -1, 0
 
 
 @compiled

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from impactbench.reference.features import room
+from impactbench.reference.rigid_body import rotation
 from impactbench.reference.rigid_contacts import find
-from impactbench.reference.solids import build_solids
+from impactbench.reference.solids import SPACE, build_solids
 from impactbench.scenarios.records import Body, Box, Capsule, Model, Scene
 
 PLANAR = Model((0, 2), rotation=True)
@@ -200,3 +201,23 @@ def test_a_capsule_across_an_edge_lies_on_its_inner_end_and_on_the_edge():
     assert points == pytest.approx([-0.1, 0.5])
     for f in found:
         assert f[2] == pytest.approx([0.0, 0.0, 1.0])
+
+
+@given(st.tuples(*[st.floats(-1.5, 1.5)] * 3), st.tuples(*[st.floats(-1, 1)] * 4))
+@settings(max_examples=100, deadline=None)
+def test_a_capsules_gap_in_space_is_its_lines_distance_less_the_radius(place, turn):
+    size = math.hypot(*turn)
+    if size < 0.1:
+        return
+    a = Body("box", Box((0.5, 0.4, 0.3)), 1.0, (0.0, 0.0, 0.0))
+    b = Body("capsule", Capsule(0.2, 0.5), 1.0, place, orientation=tuple(q / size for q in turn))
+    solids, found = (
+        build_solids(Scene("test", (a, b), 1.0, Model((0, 1, 2), rotation=True), 1.0, 1.0, 1.0), SPACE),
+        room(),
+    )
+    count = find(solids, 0, 1, found)
+    points = np.array(place) + np.linspace(-0.5, 0.5, 2001)[:, None] * rotation(b.orientation)[:, 2]
+    away = np.linalg.norm(points - np.clip(points, *np.array([[-0.5, -0.4, -0.3], [0.5, 0.4, 0.3]])), axis=1).min()
+    if away > 1e-3:  # else the line may cross the box
+        # The nearest sample lies within 0.25 mm of the nearest point.
+        assert away - 0.2 - 2.5e-4 <= found.gap[:count].min() <= away - 0.2 + ROUND
