@@ -1,6 +1,6 @@
 """Compile the kernels of all runners, so that later processes load them from disk.
 
-Those of the bodies that turn are half of it: some 30 s of one core.
+Those of the bodies that turn are half of it: some 40 s of one core.
 """
 
 from __future__ import annotations
