@@ -7,7 +7,8 @@ from collections import defaultdict
 from itertools import product
 from operator import add
 
-from impactbench.reference.triples import back, dot, length, matrix, plus, subtract
+import numpy as np
+from impactbench.reference.rigid_body import rotation
 from impactbench.scenarios.records import Body, Box, Capsule, HalfSpace, Scene, Sphere, Vector
 
 MARGIN = 1e-9
@@ -67,15 +68,14 @@ def radius_around(shape: Sphere | Box | Capsule) -> float:
 
 def depth(static: Body, point: Vector) -> float:
     """How far [m] a point lies below the body's surface; negative outside (there no more than a sign)."""
-    away = subtract(point, static.position)
+    away = np.subtract(point, static.position)
     if isinstance(static.shape, HalfSpace):
-        return -dot(away, static.shape.normal)
-    own = back(matrix(static.orientation), away)
+        return -float(away @ np.array(static.shape.normal))
+    x, y, z = (float(way) for way in away @ rotation(static.orientation))
     match static.shape:
         case Sphere(radius):
-            return radius - length(own)
-        case Box(half):
-            return min(h - abs(x) for h, x in zip(half, own, strict=True))
+            return radius - math.hypot(x, y, z)
+        case Box((a, b, c)):
+            return min(a - abs(x), b - abs(y), c - abs(z))
         case Capsule(radius, half_length):
-            along = min(half_length, max(-half_length, own[2]))
-            return radius - length(plus(own, -along, (0.0, 0.0, 1.0)))
+            return radius - math.hypot(x, y, z - min(half_length, max(-half_length, z)))

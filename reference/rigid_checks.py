@@ -10,11 +10,11 @@ from impactbench.reference.rigid_contacts import check_pair
 from impactbench.scenarios.engine import Unsupported
 from impactbench.scenarios.records import Body, Model, Scene
 
-MOST = 16
-"""Movable bodies: each pair is looked at several times a step, in Python."""
+MOST = 500
+"""Movable bodies: all their pairs are kept, and looked through whenever a body has moved by some part of its size."""
 
 
-def check_rigid(scene: Scene, model: Model) -> None:
+def check_rigid(scene: Scene, model: Model, plane: int) -> None:
     """ValueError for numbers that make no sense, `Unsupported` for what this runner does not do."""
     for body in scene.bodies:
         check(body)
@@ -28,7 +28,7 @@ def check_rigid(scene: Scene, model: Model) -> None:
         raise Unsupported(f"the rigid runner takes up to {MOST} movable bodies; this scene has {len(scene.movable)}")
     if scene.collide:
         for first, second in handled_pairs(scene.statics, scene.movable):
-            check_pair(scene.bodies[first], scene.bodies[second])
+            check_pair(scene.bodies[first], scene.bodies[second], plane)
 
 
 def check_inertia(body: Body) -> None:

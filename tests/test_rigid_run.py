@@ -301,10 +301,12 @@ def test_what_it_does_not_do_is_declared():
     crate = Body("crate", Box((0.1, 0.1, 0.1)), 1.0, (0.0, 0.0, 0.1))
     with pytest.raises(Unsupported, match=r"'low' and 'crate'.*box on box"):
         engine(scene(replace(crate, name="low", mass=None), replace(crate, position=(0.0, 0.0, 1.0))))
+    with pytest.raises(Unsupported, match=r"'askew'.*square"):
+        engine(scene(crate, replace(crate, name="askew", position=(0.0, 0.0, 1.0), orientation=TURNED), axes=PLANE))
     with pytest.raises(Unsupported, match="one axis"):
         engine(scene(BALL, axes=(0,)))
-    with pytest.raises(Unsupported, match="up to 16 movable"):
-        engine(scene(*(replace(BALL, name=f"{k}", position=(float(k), 0.0, 0.0)) for k in range(17))))
+    with pytest.raises(Unsupported, match="up to 500 movable"):
+        engine(scene(*(replace(BALL, name=f"{k}", position=(float(k), 0.0, 0.0)) for k in range(501))))
     with pytest.raises(Unsupported, match="revert"):
         engine(scene(BALL), profile="revert")
 
