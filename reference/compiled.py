@@ -41,6 +41,11 @@ def inlined(kernel: Kernel) -> Kernel:
     return _compile(kernel, forceinline=True, _nrt=False)
 
 
+def merged(kernel: Kernel) -> Kernel:
+    """Like `compiled`, set into its only caller: handing on dozens of arrays costs as much as a small step itself."""
+    return _compile(kernel, forceinline=True)
+
+
 def _compile(kernel: Kernel, **options: bool) -> Kernel:
     """Without the second entry that numba makes for callbacks of C: nobody calls it, and it takes time to compile."""
     usual = config.CACHE_DIR

@@ -120,7 +120,7 @@ def squared_way(position: Floats, origin: Floats, i: int) -> float:
     return square
 
 
-@compiled
+@inlined
 def all_listed(position: Floats, rooms: Rooms, progress: Progress, reach: float) -> bool:
     """Whether all pairs within `reach` [m] are still listed; where not, `progress` wants them."""
     for i in rooms.movable:

@@ -50,11 +50,40 @@ class Rules(NamedTuple):
 def run(bodies: Bodies, pairs: Pairs, rooms: Rooms, progress: Progress, rules: Rules, steps: int) -> int:
     """Advance by `steps`. Returns how many were done: fewer where contacts found no common solution in `SWEEPS`, or
     where a new list of pairs is wanted, as `progress` says.
+
+    One long kernel: handing on so many arrays to another would cost as much as the step of a few bodies.
     """
+    before, v, x = progress.before, bodies.velocity, bodies.position
     for done in range(steps):
         if progress.stage[0] == BEGIN:
-            meet_and_move(bodies, pairs, progress, rules)
+            active = detect(bodies, pairs, rules.touch)
+            slow_approach(pairs, active, rules)
+            for p in active:
+                pairs.touched[p] |= relative(bodies, pairs, p)[0] >= -pairs.slow[p]
+            resolve_impacts(bodies, pairs, active, rules.doc, IMPACT_SWEEPS)
+
+            # Lasting contacts carry no approach into the step; what they pushed here is no part of the step's weight.
+            weight = pairs.push.copy()
+            pairs.push[:] = 0.0
+            rest = hold(bodies, pairs, active, False, rules.still, SWEEPS)
+            # A pair that parts before gravity acts is in flight: catching it within the step would do work on it.
+            lasting = active[parting(bodies, pairs, active) <= 1e3 * rules.still]
+            pairs.push[:] = 0.0
+            pairs.push[lasting] = weight[lasting]
+            before[:], progress.last[:] = v, x
+            for i in range(len(v)):
+                if bodies.inverse_mass[i] > 0:
+                    v[i] += rules.step * rules.gravity
+            progress.rest[0] = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
+            if rules.doc:
+                damp(bodies, pairs, lasting, rules.step, rules.still)
+
+            v[:] *= rules.carried
+            x[:] += rules.step / 2 * (before + v) * rules.carried
+            pairs.touched[:] = pairs.touching
+            pairs.parted[:] = 0.0
             progress.stage[0] = MOVED
+
         if rules.revert:
             apart = revert(bodies, pairs, rooms, progress, rules)
         else:
@@ -75,38 +104,6 @@ def start(bodies: Bodies, pairs: Pairs, rules: Rules) -> None:
     """Contacts that touch at t = 0 are lasting ones (documents, rule R3)."""
     detect(bodies, pairs, rules.touch)
     pairs.touched[:] = pairs.touching
-
-
-@compiled
-def meet_and_move(bodies: Bodies, pairs: Pairs, progress: Progress, rules: Rules) -> None:
-    """All of a step but what keeps bodies apart."""
-    active = detect(bodies, pairs, rules.touch)
-    slow_approach(pairs, active, rules)
-    for p in active:
-        pairs.touched[p] |= relative(bodies, pairs, p)[0] >= -pairs.slow[p]
-    resolve_impacts(bodies, pairs, active, rules.doc, IMPACT_SWEEPS)
-
-    # Lasting contacts carry no approach into the step; what they pushed here is no part of the step's weight.
-    weight = pairs.push.copy()
-    pairs.push[:] = 0.0
-    rest = hold(bodies, pairs, active, False, rules.still, SWEEPS)
-    # A pair that parts before gravity acts is in flight: catching it within the step would do work on it.
-    lasting = active[parting(bodies, pairs, active) <= 1e3 * rules.still]
-    pairs.push[:] = 0.0
-    pairs.push[lasting] = weight[lasting]
-    before = progress.before
-    before[:], progress.last[:] = bodies.velocity, bodies.position
-    for i in range(len(bodies.inverse_mass)):
-        if bodies.inverse_mass[i] > 0:
-            bodies.velocity[i] += rules.step * rules.gravity
-    progress.rest[0] = max(rest, hold(bodies, pairs, lasting, not rules.doc, rules.still, SWEEPS))
-    if rules.doc:
-        damp(bodies, pairs, lasting, rules.step, rules.still)
-
-    bodies.velocity[:] *= rules.carried
-    bodies.position[:] += rules.step / 2 * (before + bodies.velocity) * rules.carried
-    pairs.touched[:] = pairs.touching
-    pairs.parted[:] = 0.0
 
 
 @compiled
