@@ -100,8 +100,18 @@ def gone(pid: int) -> bool:
         return True
 
 
+EARLIER: set[int] = set()
+"""Children that run for the whole session: a browser, say."""
+
+
+@pytest.fixture(autouse=True)
+def _leave_out_earlier_children() -> None:
+    EARLIER.clear()
+    EARLIER.update(children())
+
+
 def children() -> set[int]:
-    """Every process whose parent is this one, zombies included."""
+    """Every process that this one has started since the test began, zombies included."""
     found = set()
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -110,7 +120,7 @@ def children() -> set[int]:
             continue
         if int(fields[1]) == os.getpid():
             found.add(int(stat.parent.name))
-    return found
+    return found - EARLIER
 
 
 def eventually(condition: object, seconds: float = 5.0) -> bool:

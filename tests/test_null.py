@@ -52,7 +52,8 @@ def test_the_chart_shows_them_as_named_lines() -> None:
     maker = Maker()
     maker.ladder("a", "x/y", 0.1, 1e-3)
     described = case("a", "a") | {"null": {"frozen": 0.5, "no contact": 0.0}, "floor": 2e-10}
-    (spec,) = (json.loads(spec) for spec in specs(page.render(document(maker, [described]))))
+    spec, narrow = (json.loads(spec) for spec in specs(page.render(document(maker, [described]))))
+    assert spec["width"] > narrow["width"]  # drawn again for a phone
     rows = [row for rows in spec["datasets"].values() for row in rows]
     named = {(row["x"], row["t"]) for row in rows if "t" in row}
     assert {(0.5, "frozen"), (2e-10, "round-off")} <= named

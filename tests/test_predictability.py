@@ -145,12 +145,13 @@ def test_where_the_reference_cannot_a_contestant_runs_the_copies() -> None:
     (rolling,) = catalogue.select(["rolling_onset[friction=0.3]"])
     slab = Body("slab", Box((9.0, 9.0, 1.0)), None, (0.0, 0.0, -1.0))
     block = Body("block", Box((0.2, 0.2, 0.1)), 1.0, (0.0, 0.0, 0.1), (3.0, 0.0, 0.0))
-    case = replace(rolling, scene=replace(rolling.scene, bodies=(slab, block)))  # box on box, turning
+    space = replace(rolling.scene.model, axes=(0, 1, 2))
+    case = replace(rolling, scene=replace(rolling.scene, bodies=(slab, block), model=space))  # box on box, in space
     with pytest.raises(Unsupported, match="name a contestant"):
         horizon(case)
-    (pymunk,) = select(["pymunk/tuned"])
-    found = horizon(case, contestant=pymunk)
-    assert (found.runner, found.reached) == ("pymunk/tuned", False)
+    (mujoco,) = select(["mujoco/tuned"])
+    found = horizon(case, contestant=mujoco)
+    assert (found.runner, found.reached) == ("mujoco/tuned", False)
 
 
 def test_known_until_is_reached_within_the_case() -> None:
