@@ -13,7 +13,6 @@ import math
 
 import numpy as np
 from impactbench.reference.compiled import compiled, inlined, merged
-from impactbench.reference.gaps import locate
 from impactbench.reference.nearby import Rooms, all_listed, look
 from impactbench.reference.particles import Bodies, Indices, Pairs
 from impactbench.reference.progress import Progress
@@ -44,6 +43,7 @@ def project(
             break
         if not all_listed(bodies.position, rooms, progress, 4 * deepest):
             return False
+        look(bodies, pairs, 4 * deepest)
         separate(bodies, pairs, np.nonzero(pairs.gap < 4 * deepest)[0], gravity, touch / 16)
         progress.stage[1] += 1
     if progress.stage[1] > 0:
@@ -68,9 +68,9 @@ def follow(bodies: Bodies, pairs: Pairs, step: float) -> None:
 
 @compiled
 def separate(bodies: Bodies, pairs: Pairs, near: Indices, gravity: Floats, tolerance: float) -> None:
-    """The least displacements that leave no overlap among the pairs `near`; bodies note what theirs cost [J]."""
-    for p in near:
-        locate(bodies, pairs, p)
+    """The least displacements that leave no overlap among the pairs `near`, which were just looked at; bodies note what
+    theirs cost [J].
+    """
     first, second = pairs.first[near], pairs.second[near]
     mass = 1 / (bodies.inverse_mass[first] + bodies.inverse_mass[second])
     holds = Holds(first, second, pairs.normal[near], np.zeros(len(near)), mass, pairs.gap[near])

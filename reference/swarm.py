@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from impactbench.reference.particles import BOX, HALF_SPACE, SPHERE, Indices
+from impactbench.reference.particles import BOX, HALF_SPACE, SPHERE, Flags, Indices
 from impactbench.reference.swarm_statics import Statics, build_statics
 from impactbench.scenarios.records import Body, HalfSpace, Scene, Sphere
 from impactbench.scenarios.trajectory import Floats
@@ -27,7 +27,7 @@ LEVEL_RATIO, LEVELS = 4.0, 8
 TOUCH, STILL = 1e-10, 1e-13
 """Gap that counts as touching and speed that counts as none, next to the scene's length and speed."""
 
-PAIRS, NEAR, SIDES, NEAR_SIDES, BUILDS, LOOKED, IMPACTS = range(7)
+PAIRS, NEAR, SIDES, NEAR_SIDES, STIRRED, BUILDS, LOOKED, IMPACTS = range(8)
 SKIN, TRAVEL, FASTEST, DEEPEST, CLOSING = range(5)
 
 
@@ -71,7 +71,8 @@ class Level(NamedTuple):
 
 class Lists(NamedTuple):
     """Flat lists of two unsigned numbers an entry. pairs: candidates (rows of `Order`), complete until a body has moved
-    by half the skin; near: those that are close now; sides, near_sides: the same for (body, static). until: for each
+    by half the skin; near: those that are close now; sides, near_sides: the same for (body, static). stirred: those of
+    `near` that touch, or may once bodies that do are taken apart. until: for each
     `BLOCK` of candidates, how many rows of `Order` hold the bodies of all up to there.
     """
 
@@ -79,6 +80,7 @@ class Lists(NamedTuple):
     near: Numbers
     sides: Numbers
     near_sides: Numbers
+    stirred: Numbers
     until: Numbers
 
 
@@ -95,6 +97,8 @@ class Swarm(NamedTuple):
     grid: Grid
     lists: Lists
     statics: Statics
+    moves: Flags
+    """Bodies of the pairs in `Lists.stirred`."""
     tally: Indices
     gauge: Floats
     step: float
@@ -130,7 +134,8 @@ def from_arrays(
         grid=_grid(place[:, d]),
         lists=make_lists(64 + 2 * n, 64 + n // 4),
         statics=statics,
-        tally=np.zeros(7, dtype=np.int64),
+        moves=np.zeros(n, dtype=np.bool_),
+        tally=np.zeros(8, dtype=np.int64),
         gauge=np.zeros(5),
         step=step,
         touch=touch,
@@ -140,7 +145,7 @@ def from_arrays(
 
 def make_lists(pairs: int, sides: int) -> Lists:
     """Room for so many pairs and sides."""
-    sizes = 2 * pairs, 2 * pairs, 2 * sides, 2 * sides, pairs // BLOCK + 1
+    sizes = 2 * pairs, 2 * pairs, 2 * sides, 2 * sides, 2 * pairs, pairs // BLOCK + 1
     return Lists(*(np.zeros(size, dtype=np.uint32) for size in sizes))
 
 

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 from impactbench.reference.compiled import compiled
-from impactbench.reference.particles import Indices
+from impactbench.reference.particles import Flags, Indices
 from impactbench.reference.swarm import (
     BLOCK,
     BUILDS,
@@ -27,6 +27,7 @@ from impactbench.reference.swarm import (
     PAIRS,
     SIDES,
     SKIN,
+    STIRRED,
     TRAVEL,
     Dim,
     Numbers,
@@ -48,10 +49,11 @@ def run(swarm: Swarm, steps: int) -> int:
     place, velocity, mass, origin = swarm.now.place, swarm.now.velocity, swarm.now.inverse_mass, swarm.built.place
     pairs, near, sides, near_sides = swarm.lists.pairs, swarm.lists.near, swarm.lists.sides, swarm.lists.near_sides
     kind, where, size, until = swarm.statics.kind, swarm.statics.place, swarm.statics.size, swarm.lists.until
+    stirred, moves = swarm.lists.stirred, swarm.moves
     for done in range(steps):
         for _ in range(SWEEPS):
             struck = strike_sides(dim, place, velocity, kind, where, size, near_sides, count, touch, swarm.still)
-            struck += strike_pairs(dim, place, velocity, mass, near, count, gauge, touch, swarm.still)
+            struck += strike_pairs(dim, place, velocity, mass, stirred, count, gauge, touch, swarm.still)
             count[IMPACTS] += struck
             if struck == 0:
                 break
@@ -66,7 +68,9 @@ def run(swarm: Swarm, steps: int) -> int:
         detect_sides(dim, place, kind, where, size, sides, near_sides, count, margin)
         for sweep in range(SWEEPS):
             moved = lift_sides(dim, place, velocity, origin, kind, where, size, near_sides, count, gauge, touch, sweep)
-            moved += part_pairs(dim, place, velocity, origin, mass, near, count, gauge, touch, sweep)
+            if sweep == 0:
+                list_stirred(dim, place, near, count, stirred, moves, touch)
+            moved += part_pairs(dim, place, velocity, origin, mass, stirred, count, gauge, touch, sweep)
             if moved == 0:
                 break
     return steps
@@ -83,6 +87,7 @@ def start(swarm: Swarm) -> bool:
     lists, statics, place = swarm.lists, swarm.statics, swarm.now.place
     swarm.tally[NEAR] = list_near(swarm.dim, place, lists.pairs, 0, swarm.tally[PAIRS], lists.near, 0, margin)
     swarm.tally[LOOKED] += swarm.tally[PAIRS]
+    list_stirred(swarm.dim, place, lists.near, swarm.tally, lists.stirred, swarm.moves, swarm.touch)
     kind, where, size = statics.kind, statics.place, statics.size
     detect_sides(swarm.dim, place, kind, where, size, lists.sides, lists.near_sides, swarm.tally, margin)
     return True
@@ -168,7 +173,7 @@ def strike_pairs(
     place: Floats,
     velocity: Floats,
     inverse_mass: Floats,
-    near: Numbers,
+    stirred: Numbers,
     count: Indices,
     gauge: Floats,
     touch: float,
@@ -176,8 +181,8 @@ def strike_pairs(
 ) -> int:
     """Impacts of the pairs that touch and approach: i_A = 2 mu_r (u . n) n (documents, rule R7). Returns how many."""
     d, struck = len(dim), 0
-    for p in range(count[NEAR]):
-        i, j = near[2 * p], near[2 * p + 1]
+    for p in range(count[STIRRED]):
+        i, j = stirred[2 * p], stirred[2 * p + 1]
         a, b = i * (d + 1), j * (d + 1)
         square, along = 0.0, 0.0
         for k in range(d):
@@ -226,13 +231,45 @@ def strike_sides(
 
 
 @compiled
+def list_stirred(
+    dim: Dim, place: Floats, near: Numbers, count: Indices, stirred: Numbers, moves: Flags, touch: float
+) -> None:
+    """List the near pairs that touch, and those that share a body with one of them, directly or through others: all
+    that projection and the next impacts can concern. The more bodies, the more sweeps the slowest chain takes, and only
+    chains are swept.
+    """
+    d, found, grows = len(dim), 0, True
+    for p in range(count[NEAR]):
+        moves[near[2 * p]] = moves[near[2 * p + 1]] = False
+    for p in range(count[NEAR]):
+        i, j = near[2 * p], near[2 * p + 1]
+        square = 0.0
+        for k in range(d):
+            square += (place[j * (d + 1) + k] - place[i * (d + 1) + k]) ** 2
+        reach = place[i * (d + 1) + d] + place[j * (d + 1) + d] + touch
+        touches = square <= reach * reach
+        moves[i] |= touches
+        moves[j] |= touches
+    while grows:
+        grows = False
+        for p in range(count[NEAR]):
+            i, j = near[2 * p], near[2 * p + 1]
+            grows |= moves[i] != moves[j]
+            moves[i] = moves[j] = moves[i] | moves[j]
+    for p in range(count[NEAR]):
+        stirred[2 * found], stirred[2 * found + 1] = near[2 * p], near[2 * p + 1]
+        found += moves[near[2 * p]]
+    count[STIRRED] = found
+
+
+@compiled
 def part_pairs(
     dim: Dim,
     place: Floats,
     velocity: Floats,
     origin: Floats,
     inverse_mass: Floats,
-    near: Numbers,
+    stirred: Numbers,
     count: Indices,
     gauge: Floats,
     touch: float,
@@ -244,8 +281,8 @@ def part_pairs(
     that overlap.
     """
     d, moved = len(dim), 0
-    for p in range(count[NEAR]):
-        i, j = near[2 * p], near[2 * p + 1]
+    for p in range(count[STIRRED]):
+        i, j = stirred[2 * p], stirred[2 * p + 1]
         a, b = i * (d + 1), j * (d + 1)
         square, closing = 0.0, 0.0
         for k in range(d):

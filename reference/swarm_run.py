@@ -17,6 +17,7 @@ from impactbench.reference.swarm import (
     PAIRS,
     SIDES,
     SKIN,
+    STIRRED,
     Swarm,
     build_swarm,
     make_lists,
@@ -125,7 +126,7 @@ def with_room(swarm: Swarm) -> Swarm:
     """The swarm with lists half as long again as is known to be needed, and empty: the next step builds them."""
     pairs = max(len(swarm.lists.pairs) // 2, 64 + 3 * int(swarm.tally[PAIRS]) // 2)
     sides = max(len(swarm.lists.sides) // 2, 64 + 3 * int(swarm.tally[SIDES]) // 2)
-    swarm.tally[[PAIRS, SIDES, NEAR, NEAR_SIDES]] = 0
+    swarm.tally[[PAIRS, SIDES, NEAR, NEAR_SIDES, STIRRED]] = 0
     swarm.gauge[SKIN] = -1.0
     return swarm._replace(lists=make_lists(pairs, sides))
 

@@ -66,7 +66,10 @@ def exact(quick: bool) -> Part:
 
 
 def growth(quick: bool) -> Part:
-    """Cost per body and step, and memory per body, from 1e2 to 1e6 spheres; sizes take turns."""
+    """Cost per body and step, and memory per body, from 1e2 to 1e6 spheres; sizes take turns.
+
+    What grows besides memory traffic: of few spheres many have a wall where others have neighbours, and so fewer pairs.
+    """
     from impactbench.reference.contestant import Stepped
 
     sizes = (100, 1000, 10_000, 100_000) if quick else (100, 1000, 10_000, 100_000, 1_000_000)
@@ -77,6 +80,7 @@ def growth(quick: bool) -> Part:
         engine = Stepped(scene, "doc", "stepped", scene.model, STEP)
         built[count] = engine, time.perf_counter() - begin
         engine.advance(max(60, 20_000 // count))  # past the first list, and into the cache
+    before, took = {count: built[count][0].figures() for count in sizes}, dict.fromkeys(sizes, 0)
     costs: dict[int, list[float]] = {count: [] for count in sizes}
     for _ in range(3 if quick else 7):
         for count in sizes:
@@ -84,15 +88,19 @@ def growth(quick: bool) -> Part:
             begin = time.perf_counter()
             built[count][0].advance(steps)
             costs[count].append((time.perf_counter() - begin) / steps / count * 1e9)
+            took[count] += steps
     rows = []
     for count in sizes:
         engine, seconds = built[count]
+        after = engine.figures()
         rows.append(
             {
                 "bodies": count,
                 "ns per body and step": sorted(costs[count])[len(costs[count]) // 2],
                 "least": min(costs[count]),
-                "bytes per body": engine.figures()["bytes"] / count,
+                "pairs a body": (after["pairs looked at"] - before[count]["pairs looked at"]) / took[count] / count,
+                "steps a list": took[count] / (after["builds"] - before[count]["builds"]),
+                "bytes per body": after["bytes"] / count,
                 "build [s]": seconds,
             }
         )
