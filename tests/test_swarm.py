@@ -137,6 +137,24 @@ def test_energy_and_overlap_of_a_crowd(d):
     assert figures["bytes"] / 400 <= 400
 
 
+@dimensions
+def test_bodies_pushed_into_others_push_those_on(d):
+    """A row in which only the first two overlap, by .2 m, and the next gaps are .01 m: taken apart, the row is .2 m
+    longer less the gaps, so that all touch, and the common centre stays.
+    """
+    places = np.array([0.0, 0.8, 1.81, 2.82, 3.83])
+    place = np.zeros((len(places) + 1, d + 1))
+    place[:-1, 0], place[-1, 0], place[:, d] = places, 100.0, 0.5
+    velocity = np.zeros_like(place)
+    velocity[-1, 0] = 9.0  # what the fastest body may do in two steps counts as near: here .075 m
+    start = prepared(from_arrays(place, velocity, np.ones(len(place)), no_statics(d), STEP, 1e-10, 1e-13))
+    now = advanced(start, 1).now
+    row = np.sort(now.place.reshape(-1, d + 1)[now.label < 5, 0])
+    assert np.diff(row).min() >= 1 - 1e-10
+    assert row[-1] - row[0] == pytest.approx(4.0, abs=1e-9)
+    assert row.mean() == pytest.approx(places.mean(), abs=1e-14)
+
+
 def test_lists_grow_where_a_crowd_is_dense():
     """Far more pairs than there is room for at first; none may be lost, so energy and walls hold."""
     n = 300
