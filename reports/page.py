@@ -36,12 +36,12 @@ def write_page(document: dict[str, Any], path: Path | str) -> None:
 
 def render(document: dict[str, Any]) -> str:
     """The page of one results document, embedding as much of its data as fits the budget; where none does, with fewer
-    charts.
+    charts, and at last without the tables that only charts need.
     """
     script = drawer().submit(bundle)
     template = environment().get_template("page.html")
     extra, left = sections.views(document), sections.absent(document)
-    for part in (1, 2, 4):
+    for part in (1, 2, 4, MAX_CHARTS):
         view = View(document, MAX_CHARTS // part)
         content = {**view.content(), "extra": extra}
         for note, data in view.embeddable():

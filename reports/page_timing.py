@@ -12,12 +12,22 @@ if TYPE_CHECKING:
     from impactbench.reports.page_view import View
 
 
+MOST_ROWS = 500
+"""Timed cells whose repeats are listed, some 350 bytes each."""
+
+
 def timing(view: View) -> dict[str, Any] | None:
-    """Every repeat of every timed cell, and the harness' own share of a run; None where nothing was timed."""
+    """Every repeat of every timed cell, and the harness' own share of a run; None where nothing was timed.
+
+    Of more than `MOST_ROWS` cells the finest steps come first; `left_out` counts the others.
+    """
     timed = view.cells[view.cells["repeats"].map(lambda found: isinstance(found, list) and bool(found))]
     if not len(timed):
         return None
-    known = _figures(view)
+    known, shown = _figures(view), timed
+    if len(timed) > MOST_ROWS:
+        shown = timed.sort_values("step", kind="stable").head(MOST_ROWS).sort_index()
+        view.thinned.append(f"Repeats are listed of {MOST_ROWS} timed cells, the finest steps first.")
     rows = [
         {
             **known.get(index, {}),
@@ -28,9 +38,9 @@ def timing(view: View) -> dict[str, Any] | None:
             "least": 1e3 * min(cell["repeats"]),
             "repeats": " ".join(number(1e3 * seconds) for seconds in cell["repeats"]),
         }
-        for index, cell in timed.iterrows()
+        for index, cell in shown.iterrows()
     ]
-    return {"rows": rows, "overhead": _overhead(view, timed)}
+    return {"rows": rows, "left_out": len(timed) - len(shown), "overhead": _overhead(view, timed)}
 
 
 def _figures(view: View) -> dict[Any, dict[str, float]]:

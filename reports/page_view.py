@@ -26,6 +26,7 @@ class View:
     def __init__(self, document: dict[str, Any], most_charts: int = MAX_CHARTS) -> None:
         self.document = document
         self.most_charts = most_charts  # families that are charted
+        self.sparse = most_charts < MAX_CHARTS // 4  # no tables of rungs but behind charts
         self.cases = {case["name"]: case for case in document["cases"]}
         self.cells = tidy_cells(document)
         self.units = {row["measure"]: row.get("unit", "1") for row in document["rows"]}
@@ -101,6 +102,8 @@ class View:
         if len(families) > self.most_charts:
             text = f"Charts are drawn for the first {self.most_charts} families; the others have tables only."
             self.thinned.append(text)
+            if self.sparse:
+                self.thinned.append("Rungs are listed behind those charts only; the others are in the results file.")
         if len(self.cases) > len(families):
             self.thinned.append(
                 "Each family charts one case; the others are in the scoreboard and the family's tables."

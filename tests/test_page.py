@@ -302,6 +302,16 @@ def test_where_no_data_fit_fewer_charts_are_drawn(monkeypatch: pytest.MonkeyPatc
     assert "Charts are drawn for the first 12 families; the others have tables only." in html
 
 
+def test_at_last_only_the_first_families_keep_the_tables_behind_charts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "BUDGET", 0)
+    html = page.render(sixty(families=24))
+    assert "Charts are drawn for the first 1 families" in html
+    assert "Rungs are listed behind those charts only; the others are in the results file." in html
+    # The featured case and the first family's are one and the same here.
+    assert html.count("Data behind the chart") == 1
+    assert html.count("the number of charts on this page is limited") == 23
+
+
 def test_a_document_without_any_result_still_makes_a_page() -> None:
     maker = Maker()
     maker.cell("a", "x/y", None, {}, state="unavailable", reason="not installed")

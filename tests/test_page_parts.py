@@ -11,7 +11,7 @@ from pathlib import Path
 import altair as alt
 import pytest
 from click.testing import CliRunner
-from impactbench.reports import charts, charts_plain, page, page_failures, page_scores
+from impactbench.reports import charts, charts_plain, page, page_failures, page_scores, page_timing
 from impactbench.reports.cli import main
 from impactbench.reports.compare import Plan, compare
 from impactbench.reports.options import cases_of, contestants_of
@@ -71,6 +71,26 @@ def test_every_repeat_is_in_the_timing_detail() -> None:
     assert [(row["repeats"], row["median"], row["least"]) for row in timing["rows"]] == [("3 1 2", 2.0, 1.0)]
     # 20 us of a run of 2 s simulated at 1 ms each
     assert "20 µs, at most 1 % of it" in timing["overhead"].replace("2e+01", "20")
+
+
+def test_of_many_timed_cells_the_finest_steps_are_listed_and_the_others_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(page_timing, "MOST_ROWS", 2)
+    maker = Maker()
+    for name in ("a", "b"):
+        for step in (60, 240):
+            maker.cell(name, "x/y", step, {"position_error": 0.1}, repeats=[1e-3])
+    made = document(maker, [case("a", "a"), case("b", "b")])
+    html = page.render(made)
+    found = page_timing.timing(View(made))
+    assert found is not None
+    assert ([(row["case"], row["step"]) for row in found["rows"]], found["left_out"]) == (
+        [("a", "1/240"), ("b", "1/240")],
+        2,
+    )
+    assert "All repeats of 2 timed cells; those of 2 more are in the results file" in html
+    assert "Repeats are listed of 2 timed cells, the finest steps first." in html
 
 
 def test_what_was_not_measured_is_named_with_its_command() -> None:
