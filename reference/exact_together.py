@@ -99,22 +99,22 @@ def gather(world: World, i: int, now: float) -> Cluster:
     """Sphere i and all that touch it, directly or through others, brought to `now` [s]."""
     s, walls, rules = world.spheres, world.walls, world.rules
     n = len(s.motion)
-    seen = np.zeros(n, dtype=np.bool_)
-    seen[i] = True
+    found, looked = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    found[i] = True
     members, pairs = [i], [(n, i, NO_WALL)]
-    pairs.pop()
+    pairs.pop()  # an empty list has no type
     done = 0
     while done < len(members):
         a = members[done]
         done += 1
+        looked[a] = True
         fly(world, a, now)
         pairs.extend([(n, a, w) for w in range(len(walls.level)) if stands_on(world, a, w)])
         for k in range(n):
-            if k != a and touches(world, a, k, now):
-                if k >= rules.movable or k not in members[:done]:
-                    pairs.append((k, a, NO_WALL))
-                if k < rules.movable and not seen[k]:
-                    seen[k] = True
+            if not looked[k] and touches(world, a, k, now):
+                pairs.append((k, a, NO_WALL))
+                if k < rules.movable and not found[k]:
+                    found[k] = True
                     members.append(k)
     count = len(pairs)
     first, second, wall = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)

@@ -52,7 +52,7 @@ PARTS: dict[str, Callable[[], None]] = {
     "particles": lambda: _step(_fall(1.0)),
     "gas": lambda: _step(gas(LARGE + 1, 2)),
 }
-"""The longest first: bodies that turn take as long as all others together."""
+"""The longest first: bodies that turn take a good third of the whole."""
 
 
 def warm_up_crowds() -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from impactbench.adapters.contestants import select as select_contestants
+from impactbench.reference import warm_up
 from impactbench.reports import compare as comparison
 from impactbench.reports import executors
 from impactbench.reports.cache import Cache
@@ -170,3 +171,7 @@ def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     extra = r"pip install 'impactbench\[cluster\]'"
     with pytest.raises(executors.ClusterError, match=extra), executors.cluster("tcp://127.0.0.1:1"):
         pass
+
+
+def test_every_part_of_the_kernels_is_compiled_before_clocks_run() -> None:
+    assert [job.argument for job in executors.WARM_UPS] == list(warm_up.PARTS)

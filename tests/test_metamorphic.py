@@ -286,3 +286,12 @@ def test_more_than_one_step_is_a_mistake_in_one_line() -> None:
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "one step" in done.stderr
+
+
+def test_where_a_quarter_of_the_step_falls_badly_a_sixteenth_decides() -> None:
+    """This impact falls so luckily in its step that at a quarter of it more than half of the deviation is left."""
+    (case,) = catalogue.select(["equal_masses[bounciness=0.25]"])
+    (contestant,) = select(["reference/stepped"])
+    rows = try_case((contestant, "nc", case.scene, 1 / 240))["rows"]
+    (phase,) = (row for row in rows if row["relation"] == "phase")
+    assert (phase["state"], "at 1/16 of the step" in phase["note"]) == ("holds", True)
